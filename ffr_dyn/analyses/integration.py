@@ -13,6 +13,7 @@ import numpy as np
 from ffr_dyn.analyses.checkpoint import Checkpoint, decode, encode, fingerprint, leaves
 from ffr_dyn.analyses.energy import EnergyWatch
 from ffr_dyn.analyses.events import Event, Watcher
+from ffr_dyn.closing.passed_positions import passed_in_words
 from ffr_dyn.compile.engine import Engine, fill_rows, new_engine, record_row
 from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.compile.workspace import new_record
@@ -20,29 +21,25 @@ from ffr_dyn.consistency import failure as failing
 from ffr_dyn.consistency.assemble import Assembled, assemble
 from ffr_dyn.consistency.doubts import BALANCE, SINGULAR, Seen, between_rows, ended, held, look, nothing_seen
 from ffr_dyn.consistency.evaluation import joined
-from ffr_dyn.consistency.following import STALLED, Lost, jumped, lost_driver, unfollowed
+from ffr_dyn.consistency.explicit_forces import told
+from ffr_dyn.consistency.following import LOST, STALLED, Lost, jumped, lost_driver, unfollowed
 from ffr_dyn.consistency.validity import meaningless
 from ffr_dyn.functions.stopwatch import Stopwatch
 from ffr_dyn.integrators import Integrator, methods
 from ffr_dyn.integrators.stabilisation import Baumgarte, Projection, Stabilisation, excess_of_gains, gains
 from ffr_dyn.kernels.tables import (
-    AT,
     EVALUATIONS,
     FILLED,
-    FIRST_PASSED,
-    LOW,
-    LOW_AT,
-    MOST_PASSED,
     NEXT,
     NOW,
     OK,
-    PASSED,
     PHI,
     PHI_DOT,
     PROJECTIONS,
     SPACING,
+    STEP_TOO_SMALL,
+    USER_FAILED,
     Record,
-    Work,
 )
 from ffr_dyn.results.file import ResultWriter, load_checkpoint, load_result
 from ffr_dyn.results.kept_rows import SMALL, Kept, Measured, Recorded, row_size
@@ -57,7 +54,6 @@ from ffr_prep.body import Surface
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError, InputError
 
-FEW = 4.0  # steps
 LOOKS = 10  # of a quantity that adds up, from row to row, where the method chooses its steps
 SURE = 10.0  # times, by which an evaluation may take longer than is guessed before the first one
 MOST_ROWS = 1000  # of the first call
@@ -215,7 +211,10 @@ def _begun(
     """The run at its start, or where the file to resume left it."""
     system, gained = assembled.system, gains(stabilisation)
     seen = nothing_seen(assembled, method, *held(system.scene, stabilisation))
-    engine = new_engine(system, assembled.x, assembled.v, method, gained, start=start, spacing=spacing)
+    dropped = assembled.all_rows is not None
+    engine = new_engine(
+        system, assembled.x, assembled.v, method, gained, start=start, spacing=spacing, keeps_passed=dropped
+    )
     energy = EnergyWatch(system, method, gained, spacing, lambda rows: with_all_reactions(assembled, rows))
     if resume is not None and Path(resume).exists():
         return _resumed(Path(resume), mark, engine, energy, seen, kept)
@@ -291,10 +290,21 @@ def _advance(
         if ends:
             return
         if status != OK:
+            _require_soft(run, method, status, reached(run.engine, start))
             gained = run.energy.gains
             settings = failing.Settings(method, gained[2] > 0, excess_of_gains(gained, run.energy.spacing))
             raise failing.failure(run.engine.system, run.engine.work, status, reached(run.engine, start), settings)
         count = int(np.clip(count * SECONDS_PER_CALL / max(watch.last, 1e-6), 1, 10 * count))
+
+
+def _require_soft(run: _Run, method: Integrator, status: int, time: float) -> None:
+    """ComputationError where steps that have failed are too long for a force that the method takes explicitly."""
+    if status in (USER_FAILED, STEP_TOO_SMALL):
+        return
+    if run.unseen is not None:
+        look(run.seen, View(run.engine.system, run.unseen))
+    for text in told(run.engine.system, method, run.seen.arrays["rates"])[:1]:
+        raise ComputationError(f"at t = {time:.6g} s the steps do not go on: {text}")
 
 
 def _first_rows(system: System, method: Integrator, substeps: int) -> int:
@@ -321,7 +331,7 @@ def _driver_lost(run: _Run, method: Integrator, start: float, rows: Record, stat
         return jumped(system, np.array([early, now, late])) or lost_driver(system, early, late, STALLED)
     if lost is None:
         return ""
-    found = lost_driver(system, lost.time - method.step, lost.time)
+    found = lost_driver(system, lost.time - method.step, lost.time, LOST)
     return found or jumped(system, np.concatenate([*run.kept.times, rows.time]))
 
 
@@ -359,21 +369,21 @@ def reached(engine: Engine, start: float) -> float:
 
 
 def with_all_reactions(assembled: Assembled, record: Record) -> Record:
-    """The record with reactions and violations of the redundant rows too: at every state, the smallest reactions that
-    give its accelerations."""
+    """The record with reactions and violations of the redundant rows too, and accelerations that all rows agree on: those
+    that the motion keeps may depend on one another where the mechanism is not singular."""
     if assembled.all_rows is None:
         return record
     system = assembled.all_rows
     engine, one = new_engine(system, record.x[0], record.v[0]), new_record(system, 1)
     names = [block.name for block in system.blocks]
     numbers = [names.index(block.name) for block in assembled.system.blocks]
-    reaction, violation = np.empty_like(record.reaction), np.empty_like(record.violation)
+    reaction, violation, vd = np.empty_like(record.reaction), np.empty_like(record.violation), np.empty_like(record.vd)
     for row, moment in enumerate(record.time):
         engine.x[:], engine.v[:] = record.x[row], record.v[row]
         engine.work.loads.reference[:] = record.forces[row]
         record_row(engine, moment, one, 0)
-        reaction[row], violation[row] = one.reaction[0, numbers], one.violation[0]
-    return record._replace(reaction=reaction, violation=violation)
+        reaction[row], violation[row], vd[row] = one.reaction[0, numbers], one.violation[0], one.vd[0]
+    return record._replace(reaction=reaction, violation=violation, vd=vd)
 
 
 # ---- stopping and going on -------------------------------------------------------------------------------------------
@@ -480,6 +490,7 @@ def _result(scene: Scene, run: _Run, attributes: dict[str, Any]) -> Result:
 
 def _account(run: _Run, notes: list[str]) -> dict[str, Any]:
     """What only the end of a run can tell."""
+    assembled = run.seen.assembled
     info, drift = run.engine.work.info, run.engine.work.drift
     return {
         "evaluations": int(info[EVALUATIONS]),
@@ -492,7 +503,9 @@ def _account(run: _Run, notes: list[str]) -> dict[str, Any]:
                 "forward",
                 run.seen,
                 {
-                    SINGULAR: _singular(run.engine.work, run.energy.spacing),
+                    SINGULAR: passed_in_words(
+                        assembled.system, assembled.all_rows, run.engine.work, run.energy.spacing
+                    ),
                     BALANCE: run.energy.amiss(),
                     **between_rows(run.seen, run.engine.system, run.engine.work, new_record(run.engine.system, 0)),
                 },
@@ -505,21 +518,3 @@ def _steps(engine: Engine) -> dict[str, Any]:
     """Steps that the method chose."""
     control = engine.tables.control
     return {"steps": int(control.counts[0]), "refused_steps": int(control.counts[1])} if control.numbers.size else {}
-
-
-def _singular(work: Work, step: float) -> list[str]:
-    """A note on the singular positions that were passed, or are just being; a few steps [s] apart they are one."""
-    share = work.independence
-    count = int(share[PASSED])
-    times = share[FIRST_PASSED:][: min(count, MOST_PASSED)].tolist()
-    if share[LOW] < AT:
-        times.append(float(share[LOW_AT]))
-    apart = [time for k, time in enumerate(times) if k == 0 or time - times[k - 1] > FEW * step]
-    if not apart:
-        return []
-    more = f" and {count - MOST_PASSED} times more" if count > MOST_PASSED else ""
-    what = "a singular position" if len(apart) == 1 else "singular positions"
-    return [
-        f"the motion passes {what} near t = {', '.join(f'{time:.6g}' for time in apart)} s{more}, where constraints become "
-        "dependent; it goes on along its branch, and reactions there are large or not unique"
-    ]

@@ -20,7 +20,7 @@ from ffr_dyn.analyses.settings import MomentSettings
 from ffr_dyn.analyses.states import held
 from ffr_dyn.consistency.assemble import Assembled, assemble, in_space
 from ffr_dyn.consistency.doubts import checked
-from ffr_dyn.consistency.equilibrium import Equilibrium, equilibrium
+from ffr_dyn.consistency.equilibrium import Equilibrium, equilibrium, jumped
 from ffr_dyn.consistency.evaluation import (
     Evaluator,
     evaluate,
@@ -37,7 +37,7 @@ from ffr_dyn.results.result import Result
 from ffr_dyn.scene.described import described
 from ffr_dyn.scene.scene import Scene
 from ffr_prep.common.arrays import Array
-from ffr_prep.common.errors import InputError
+from ffr_prep.common.errors import ComputationError, InputError
 
 NEUTRAL = 1e-7  # of a stiffness, relative to that of the applied forces
 ROUNDING = 1e-13  # of a stiffness, relative to the largest
@@ -73,7 +73,8 @@ def static(
     at = evaluator(assembled.system)
     found = equilibrium(assembled.system, time, assembled.x, sizes(at))
     lowest = _lowest_stiffness(at, assembled, found)
-    return _result(scene, assembled, at, found, time, lowest, outputs, path)
+    branch = jumped(assembled.system, time, assembled.x, sizes(at), found)
+    return _result(scene, assembled, at, found, time, (lowest, branch), outputs, path)
 
 
 def _lowest_stiffness(at: Evaluator, assembled: Assembled, found: Equilibrium) -> float:
@@ -85,6 +86,13 @@ def _lowest_stiffness(at: Evaluator, assembled: Assembled, found: Equilibrium) -
         return float("inf")
     K = Z.T @ found.balance.stiffness @ Z
     values, vectors = np.linalg.eigh(0.5 * (K + K.T))
+    if not found.found and values[0] > 0:
+        motion = named_motion(at.system.scene, at.system.layout, x, Z @ np.linalg.solve(K, Z.T @ found.balance.forces))
+        raise ComputationError(
+            f"no equilibrium was found in {len(found.steps)} steps, though what moves is held: a force jumps, has a kink or "
+            f"a pole near there, along {motion}; look at the forces and formulas that act on it, or start nearer to an "
+            "equilibrium"
+        )
     if not found.found:
         raise _not_held(assembled, x, Z @ vectors[:, 0], f"no equilibrium was found in {len(found.steps)} steps")
     applied = np.linalg.solve(M, found.balance.forces) / sizes(at)
@@ -110,7 +118,7 @@ def _result(
     at: Evaluator,
     found: Equilibrium,
     time: float,
-    lowest: float,
+    seen: tuple[float, str],
     outputs: Sequence[str],
     path: str | Path | None,
 ) -> Result:
@@ -118,8 +126,9 @@ def _result(
     for x in found.path[:-1]:  # forces count the turns of angles on the way
         evaluate(at, time, x, still)
     record = with_all_reactions(assembled, record_states(at, np.array([time]), found.path[-1:], still[None]))
+    lowest, branch = seen
     stable = lowest > 0
-    notes = [*assembled.notes, *checked("static", assembled, record)]
+    notes = [*assembled.notes, *checked("static", assembled, record), *([branch] if branch else [])]
     if not stable:
         notes.append(f"the equilibrium is unstable: its lowest stiffness per mass is {lowest:.4g} 1/s^2")
     attributes = {

@@ -62,11 +62,13 @@ def new_engine(
     *,
     start: float = 0.0,
     spacing: float = 0.0,
+    keeps_passed: bool = False,
 ) -> Engine:
     """Memory for a scene at the state (x, v), which it owns, and for a method (none: evaluations alone).
 
     start   : time of step number 0 [s]
     spacing : of the numbered steps of a method that chooses its own [s]
+    keeps_passed : whether positions beside singular ones are kept (`Work.passed`)
 
     The first engine of a kind waits until what it needs is compiled.
     """
@@ -83,7 +85,8 @@ def new_engine(
         stages = new_stages(system, method.stage_count, method.row_stages, method.numbers, kept)
     clock = Clock(np.array([h, h or spacing]), np.zeros(3, dtype=np.int64), np.array(gains))
     control = _control(system, method, start, spacing)
-    work, of_work = new_work(system.model, keeps_terms=method is not None and method.keeps_terms)
+    keeps_terms = method is not None and method.keeps_terms
+    work, of_work = new_work(system.model, keeps_terms=keeps_terms, keeps_passed=keeps_passed)
     places = np.array([0 if each is None else each.address for each in chosen], dtype=np.int64)
     if method is not None:
         places[step.number] = method.do_step.address

@@ -35,17 +35,18 @@ MOST, LARGE = 32, 100_000  # pieces of memory that are known, and numbers of one
 _BLANK: dict[Hashable, Piece[Work]] = {}
 
 
-def new_work(m: Model, *, keeps_terms: bool = False) -> tuple[Work, dict[int, int]]:
+def new_work(m: Model, *, keeps_terms: bool = False, keeps_passed: bool = False) -> tuple[Work, dict[int, int]]:
     """Scratch of evaluations, and where its arrays are; what depends on the elastic diagonal is made when that is set.
 
-    keeps_terms : whether the quadratic terms of all bodies are needed after an evaluation
+    keeps_terms  : whether the quadratic terms of all bodies are needed after an evaluation
+    keeps_passed : whether positions beside singular ones are
 
     Scenes of one structure have the same scratch but for the numbers that `_fill` puts there.
     """
-    key = _structure(m), keeps_terms
+    key = _structure(m), keeps_terms, keeps_passed
     blank = _BLANK.get(key)
     if blank is None:
-        blank = in_one_piece(_blank_work(m, keeps_terms))
+        blank = in_one_piece(_blank_work(m, keeps_terms, keeps_passed))
         if len(_BLANK) >= MOST:
             _BLANK.clear()
         if blank.numbers.size < LARGE:
@@ -66,7 +67,8 @@ def _structure(m: Model) -> Hashable:
         m.loads.initial,
         m.pattern.sample,
     )
-    return b"".join(table.tobytes() for table in tables), m.rows.marker.shape, tuple(map(len, sizes)), m.user_count
+    arrays = b"".join(table.tobytes() for table in tables), m.rows.marker.shape, tuple(map(len, sizes))
+    return arrays, m.user_count, m.relaxation > 0.0
 
 
 def _fill(work: Work, m: Model) -> None:
@@ -81,7 +83,7 @@ def _fill(work: Work, m: Model) -> None:
         bodies.inverse[b, 1] = _inverse(np.trace(bodies.J[b]))
 
 
-def _blank_work(m: Model, keeps_terms: bool) -> Work:
+def _blank_work(m: Model, keeps_terms: bool, keeps_passed: bool) -> Work:
     V, n = 6 * m.bodies.mass.size + int(m.bodies.where[-1, IN_Q]), m.bodies.where[:, N]
     bodies = _body_work(m, keeps_terms)
     return Work(
@@ -95,6 +97,7 @@ def _blank_work(m: Model, keeps_terms: bool) -> Work:
         info=np.zeros(3, dtype=np.int64),
         independence=np.array([1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 1.0, 0.0, *np.zeros(MOST_PASSED)]),
         **_zeros(vd=V, y=(2, 6 + int(n.max())), functions=(m.functions.kind.size, 3), user=m.user_count, drift=4),
+        passed=np.zeros((MOST_PASSED + 1, m.bodies.mass.size + V) if keeps_passed else (0, 0)),
     )
 
 
@@ -131,7 +134,7 @@ def _body_work(m: Model, keeps_terms: bool) -> BodyWork:
         **_zeros(omega=(B + 1, 3), s=(B, 3), J=(B, 3, 3), inverse=(B, 2), g=9 * terms, l=3 * terms),
         sorted=np.zeros(17 * longest + 4 * LANES),
         **_zeros(H=3 * E, L=(B, 6, 6), f=V, acc=V, T=(B, 3, 3), rigid=(B, 6)),
-        **_zeros(more=V, settled=V if m.bodies.coupled_damping.size else 0),
+        **_zeros(more=V, settled=V if m.bodies.coupled_damping.size else 0, solved=V * (m.relaxation > 0.0)),
     )
 
 
@@ -142,7 +145,7 @@ def _row_work(m: Model) -> RowWork:
     column = np.repeat(np.arange(K), np.diff(m.pattern.column_start))
     stored = LANES * int(size.sum() + size[column].sum())
     return RowWork(
-        **_zeros(Phi=C, nu=C, gamma=C, lam=C, left=C),
+        **_zeros(Phi=C, nu=C, gamma=C, lam=C, left=C, reacted=C * (m.relaxation > 0.0)),
         **_zeros(jac=(K * D, 9, LANES), kept=(K * D, 9, LANES), X=K * D * 12 * LANES, Y=12 * LANES),
         **_zeros(scale=K * LANES, least=K * LANES, pivots=K * LANES, step=K * LANES),
         **_zeros(compliance=K * LANES, pull=K * LANES, relief=K * LANES),

@@ -32,7 +32,7 @@ from ffr_prep.common.brief import Brief
 from ffr_prep.common.errors import InputError
 
 SHIFTED = 1e-6  # m, rad, from where it is told that assembly moved a body
-RELAXATION = 1e-8  # of dependent rows, relative
+RELAXATION = 1e-6  # of dependent rows, relative: rounding over it is what their reactions are uncertain by
 TORN = 0.5  # elastic displacement of an interface over the size of its body that no joint may ask for
 
 

@@ -44,8 +44,8 @@ def add_rows(account: Account, rows: Record, powers: Array) -> None:
     """Go on by the rows that follow; powers (T, F + drivers) of all forces and drivers."""
     system, numbers = account.system, account.numbers
     stored, power = _stored(system, rows), _power(system, rows, powers)
-    energy = rows.energy[:, 0] + rows.energy[:, 1] + stored
-    total = energy + rows.energy[:, 2]
+    own = rows.energy[:, 0] + rows.energy[:, 1]
+    energy, total = own + np.abs(stored), own + stored + rows.energy[:, 2]  # that of a negative stiffness is below zero
     if np.isnan(numbers[TIME]):
         numbers[:] = [rows.time[0], total[0], 0.0, 0.0, energy[0], 0.0, rows.time[0], power[0], power[0]]
     steps = np.diff(rows.time, prepend=numbers[TIME])

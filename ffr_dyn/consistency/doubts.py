@@ -16,7 +16,7 @@ from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.consistency.assemble import Assembled
 from ffr_dyn.consistency.evaluation import evaluate, evaluator
 from ffr_dyn.consistency.explicit_forces import candidates, fastest, told
-from ffr_dyn.consistency.following import row_named, unfollowed
+from ffr_dyn.consistency.following import jump_of, row_named, unfollowed
 from ffr_dyn.consistency.validity import extremes, meaningless, strained, unstiffened
 from ffr_dyn.equations.inertia import kept_integrals, mass_matrix
 from ffr_dyn.integrators import Integrator
@@ -163,6 +163,8 @@ def between_rows(seen: Seen, system: System, work: Work, rows: Record) -> dict[s
     if not opened > seen.tolerance:
         return {}
     block, word = row_named(system, int(work.drift[OPENED]))
+    if word.function is not None and (jump := jump_of(block, word, time - method.step, time)):
+        return {OPEN: [jump]}
     return {
         OPEN: [
             f"at t = {time:.6g} s the row '{word.text}' of {block.name!r} is open by {opened:.2g} at the end of a step, "

@@ -38,6 +38,10 @@ BACK = -0.5  # part of a step that the following one may go back
 OPEN = (
     0.25  # rad, or part of the size: motion to the rows beyond which a step is that alone; its shift counts as infinite
 )
+UNLOADED = 0.01  # of the loads: a scene that bears next to nothing
+# Of `jumped`: the logarithm by which loads change at once, at most and least; a Newton step over the one before.
+LARGEST_CHANGE, LEAST_CHANGE, CONTRACTS = 1.2, 1e-3, 0.5
+SAME = 1e-3  # of how far an equilibrium is from the start: two that are one
 ATTEMPTS, HALVINGS = 40, 3  # shifts four times as large each; and between the last of them and the one before
 
 
@@ -121,6 +125,62 @@ def _newton(problem: _Problem, start: Equilibrium, share: float, iterations: int
         path.append(there)
         x, lam, now, radius = there, step.lam, beyond, min(2 * radius if ahead > 0.5 * BACK else radius, LARGEST_STEP)
     return Equilibrium(np.array([start.path[-1], *path]), lam, now, tuple(steps), False)
+
+
+def jumped(system: System, time: float, x: Array, sizes: Array, found: Equilibrium) -> str:
+    """Whether an equilibrium from x is on another branch than that of small loads, in words; empty where it is not.
+
+    Newton's steps may lead over a fold, behind which small loads have no equilibrium nearby, or over a pole of a force. As
+    the loads are taken off bit by bit, the scene then does not come to where small ones bring it from the start. That is
+    looked at, as loads that grow are: both by changes small enough to stay on their branch.
+    """
+    problem = _Problem(system, time, total_mass_matrix(system.scene, system.layout, x), sizes)
+    start = Equilibrium(x[None], None, problem.balance(x, None, {}, 1.0), (), False)
+    small = _newton(problem, start, UNLOADED, ITERATIONS)
+    if not small.found or _apart(problem, x, small.path[-1]) > _apart(problem, x, found.path[-1]):
+        return ""  # small loads do not know of where the scene is drawn
+    off, share = _followed(problem, found, 1.0, UNLOADED)
+    far = _apart(problem, x, found.path[-1])
+    if share == UNLOADED and _apart(problem, off.path[-1], small.path[-1]) <= SAME * max(far, SAME):
+        return ""
+    grown, share = _followed(problem, small, UNLOADED, 1.0)
+    if share < 1.0:
+        return (
+            f"loads that grow find no equilibrium near the last one beyond {share:.3g} of their size: there the scene jumps, "
+            "or a force has a pole, and the equilibrium found is on another branch; look at smaller loads, or run forward "
+            "with damping"
+        )
+    if _apart(problem, grown.path[-1], found.path[-1]) <= SAME * max(far, SAME):
+        return ""
+    return (
+        "loads that grow from nothing come to another equilibrium than all loads at once, which is the one found; start "
+        "nearer to the one wanted"
+    )
+
+
+def _followed(problem: _Problem, now: Equilibrium, share: float, goal: float) -> tuple[Equilibrium, float]:
+    """The equilibrium as the share of the loads goes to a goal, and the share that is reached on its branch."""
+    size, way = LARGEST_CHANGE, np.sign(goal - share)
+    while share != goal and size > LEAST_CHANGE:
+        wanted = goal if abs(np.log(goal / share)) <= size else share * np.exp(way * size)
+        there = _newton(problem, now, wanted, ITERATIONS_OF_A_SHARE)
+        lengths = np.array(there.steps[:-1])
+        if not there.found or (lengths[1:] > CONTRACTS * lengths[:-1]).any():
+            size /= 2
+            continue
+        share, now, size = wanted, there, min(2 * size, LARGEST_CHANGE)
+    return now, share
+
+
+def _apart(problem: _Problem, x: Array, other: Array) -> float:
+    """How far two positions are from each other: rad, or part of the scene's size."""
+    place = problem.system.layout
+    found = [0.0]
+    for b in range(len(place.n)):
+        for at, width in ((place.R(b), problem.sizes[place.R_dot(b)]), (place.q(b), problem.sizes[place.q_dot(b)])):
+            found += (np.abs(x[at] - other[at]) / width).tolist()
+        found.append(2.0 * float(np.arccos(min(1.0, abs(x[place.p(b)] @ other[place.p(b)])))))
+    return max(found)
 
 
 @dataclass(frozen=True)

@@ -63,7 +63,7 @@ def jumped(system: System, times: Array) -> str:
     for block, word in said:
         value, rate, _ = np.array([drive_of(word, float(t)) for t in times]).T
         off = np.abs(np.diff(value) - 0.5 * (rate[1:] + rate[:-1]) * np.diff(times))
-        for k in np.flatnonzero(off > FAST * _whole(system.scene, word)):
+        for k in np.flatnonzero(off > LOST * _whole(system.scene, word)):
             time, jump = _jump(word, float(times[k]), float(times[k + 1]))
             if abs(jump) > SUDDEN * off[k]:
                 return _told_jump(block, word, time, jump)
@@ -78,20 +78,27 @@ def lost_driver(system: System, start: float, end: float, far: float = FAST) -> 
         for word in block.words:
             if word.function is None:
                 continue
-            changes = np.abs(np.diff([drive_of(word, t)[0] for t in times]))
-            if not changes.sum() > far * _whole(system.scene, word):
+            moved = float(np.abs(np.diff([drive_of(word, t)[0] for t in times])).sum())
+            if not moved > far * _whole(system.scene, word):
                 continue
-            k = int(np.argmax(changes))
-            time, jump = _jump(word, float(times[k]), float(times[k + 1]))
-            if abs(jump) > SUDDEN * changes.sum():
-                return _told_jump(block, word, time, jump)
-            short = 0.1 * (end - start) / changes.sum() * _whole(system.scene, word)
+            if jump := jump_of(block, word, start, end):
+                return jump
+            short = 0.1 * (end - start) / moved * _whole(system.scene, word)
             return (
-                f"{_called(block)} moves by {changes.sum():.3g} {_unit(word)} within the step that ends at t = {end:.6g} s: "
+                f"{_called(block)} moves by {moved:.3g} {_unit(word)} within the step that ends at t = {end:.6g} s: "
                 "the motion between the steps is more than the method follows; let it move more slowly, or use steps below "
                 f"{short:.2g} s"
             )
     return ""
+
+
+def jump_of(block: Block, word: Word, start: float, end: float) -> str:
+    """That a driver jumps within a step [s], however little; empty where it does not."""
+    times = np.linspace(max(start, 0.0), end, SAMPLES)
+    changes = np.abs(np.diff([drive_of(word, float(t))[0] for t in times]))
+    k = int(np.argmax(changes))
+    time, jump = _jump(word, float(times[k]), float(times[k + 1]))
+    return _told_jump(block, word, time, jump) if abs(jump) > SUDDEN * changes.sum() > 0 else ""
 
 
 def _told_jump(block: Block, word: Word, time: float, jump: float) -> str:

@@ -30,7 +30,7 @@ ARM = 1e-6  # of the largest range of forces times that of positions, the same f
 MIDDLE, WINDOW = 2.2 * 1.5**0.5, 16  # of amplitudes of methods of order three
 NOISE = (70 / 36) ** 0.5  # by which rows without relation are farther off the curve than they are large
 RATES = {"position": "velocity", "R": "v", "q": "q_dot"}
-CONSTANT = 1e-8  # of the size of a kind: a range below it is rounding, as of the rate of an even turn
+CONSTANT = 1e-7  # of the size of a kind: a range below it is rounding, as of the rate of an even turn
 AT_ONCE = 2e7  # bytes of numbers that are compared side by side
 COARSE = 0.01  # of the range, by which a row may be off the curve through its neighbours
 
@@ -169,7 +169,16 @@ def ranges(run: Result) -> dict[str, float]:
         kind: max(LITTLE * most, CONSTANT * sizes[kind], arm if kind == "moment" else 0.0)
         for kind, most in largest.items()
     }
+    for kind, floor in _floors_at_rest(run, sizes).items():
+        floors[kind] = max(floors.get(kind, 0.0), floor)
     return {name: max(span, floors[_kind(name)]) for name, span in spans.items()}
+
+
+def _floors_at_rest(run: Result, sizes: dict[str, float]) -> dict[str, float]:
+    """Of rates and energies of what does not move at all, where positions and forces have a size."""
+    lasts = float(np.ptp(run.time)) if run.time.size else 0.0
+    far, rate = sizes.get("position", 0.0), CONSTANT / lasts if lasts > 0 else 0.0
+    return {"velocity": far * rate, "omega_bar": rate, "energy": CONSTANT * far * sizes.get("force", 0.0)}
 
 
 def _kind(name: str) -> str:

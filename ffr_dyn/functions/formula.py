@@ -166,7 +166,7 @@ class _Reader:
     def _parameter(self, node: ast.expr, given: object) -> Expression:
         if isinstance(given, TimeFunction):  # an input of the scene
             return given
-        if type(given) not in (int, float):
+        if not isinstance(given, (int, float)) or isinstance(given, bool):
             raise self._refusal(node, f"is the parameter {given!r}, which is not a number")
         return constant(float(given))  # type: ignore[arg-type]
 

@@ -32,6 +32,7 @@ from typing import ClassVar
 
 from ffr_dyn.integrators.step import check_step
 from ffr_dyn.kernels.integrator_api import (
+    IN_V,
     NOT_FINITE,
     OK,
     PHI,
@@ -74,7 +75,9 @@ NOW, BEFORE, NEXT, A_NOW, A_NEXT, V, MOTION, SHIFT, CORRECTION = range(9)
 ALPHA_M, ALPHA_F, BETA, GAMMA, TOLERANCE, LIMIT, STABILISED, SCALED, STARTED, RATE = range(10)
 # Rows of stages.rows: multipliers before the last correction, and corrections of the position.
 LAM, ETA = range(2)
-ROUNDING = 4e-15  # of positions, over the step: what rounding leaves of a velocity
+# Of positions, over the step, and of the accelerations by all forces together, times it: what rounding leaves of a velocity,
+# of a scene at rest too.
+ROUNDING = 4e-15
 
 
 @inlined
@@ -168,6 +171,27 @@ def newton(r, h, square, single):
 
 
 @inlined
+def farthest_marker(positions):
+    """The largest coordinate of a marker [m]."""
+    result = 0.0
+    for k in range(positions.shape[0]):
+        for c in range(3):
+            result = max(result, abs(positions[k, c]))
+    return result
+
+
+@inlined
+def largest_push(bodies, work):
+    """[m/s^2] the largest acceleration that all forces but those of joints give a body, a moment at its radius of inertia."""
+    result = 0.0
+    for b in range(bodies.mass.size):
+        j, by_mass, by_inertia = bodies.where[b, IN_V], work.inverse[b, 0], work.inverse[b, 1]
+        for c in range(3):
+            result = max(result, abs(work.f[j + c]) * by_mass, abs(work.f[j + 3 + c]) * (by_mass * by_inertia) ** 0.5)
+    return result
+
+
+@inlined
 def size_of(r, h, single):
     """(size of the last correction, what is allowed, worst body): velocities [m/s], or unscaled accelerations and
     multipliers."""
@@ -176,7 +200,9 @@ def size_of(r, h, single):
     acceleration = largest_motion(bodies, J, s.v[NEXT])[0]
     if s.numbers[SCALED] > 0.0:
         scale = largest_motion(bodies, J, s.v[V])[0] + h * acceleration
-        return single * change, s.numbers[TOLERANCE] * scale + ROUNDING * farthest(bodies, s.x[0]) / h, worst
+        far = max(farthest(bodies, s.x[0]), farthest_marker(r.work.markers.r))
+        rounding = ROUNDING * (far / h + single * largest_push(bodies, r.work.bodies))
+        return single * change, s.numbers[TOLERANCE] * scale + rounding, worst
     add_scaled(s.rows[LAM], s.rows[LAM], -1.0, r.work.rows.lam)
     scale = max(acceleration, largest(r.work.rows.lam))
     return max(change, largest(s.rows[LAM])), s.numbers[TOLERANCE] * scale, worst

@@ -16,10 +16,11 @@ from ffr_dyn.kernels.output_row import keep
 from ffr_dyn.kernels.rows import evaluate_block
 from ffr_dyn.kernels.simd.entry_point import entry_point
 from ffr_dyn.kernels.simd.slices import part, vector_at
-from ffr_dyn.kernels.singular_positions import note_independence, numbered_step
+from ffr_dyn.kernels.singular_positions import keep_closest, note_independence, numbered_step
 from ffr_dyn.kernels.solution import (
     constraint_rates,
     gather_rows,
+    react,
     reduce_miss,
     reduced_rates,
     solve_back,
@@ -59,6 +60,7 @@ from ffr_dyn.kernels.tables import (
     NOW,
     OF_JOINTS,
     OK,
+    PASSED,
     PER_ROW,
     PHI,
     PHI_DOT,
@@ -77,7 +79,10 @@ from ffr_dyn.kernels.tables import (
 )
 from ffr_dyn.kernels.vectors import add_scaled, copy, fill
 
-PASSES = 10  # at most, where rows depend on one another
+PASSES, SETTLES = (
+    20,
+    0.9,
+)  # at most, where rows depend on one another; of what is left, to which a pass brings it no more
 GROSS = 1.0  # m, -: of a violation that no projection puts right
 SETTLING, SETTLED = 60, 1e-11  # iterations with a damping matrix, and the relative change at which they end
 UNMET = 1e3  # tolerances, beyond which a violation that the projection does not take back is no drift
@@ -175,7 +180,10 @@ def evaluate(r: Tables, t: float, x: Vector, v: Vector) -> int:
     evaluate_markers(r, IN_USE, x, v)
     load_all(r, x)
     constraint_rows(r)
-    return factorise_joints(r, t)
+    passed = r.work.independence[PASSED]
+    status = factorise_joints(r, t)
+    keep_closest(r.work.independence, r.work.passed, passed, t, vector_at(x, r.x.size))
+    return status
 
 
 @entry_point()
@@ -263,21 +271,17 @@ def project(r: Tables, value: Vector) -> int:
     return back_substitute(r)
 
 
-@solve.where(has_dependent_rows)
-def solve_of_dependent_rows(r: Tables, target: Vector) -> int:
-    """What relaxation of the multiplier matrix does to the motion, taken out again.
-
-    Of the multipliers that dependent rows leave open, the smallest are found (method of multipliers; Bayo & Ledesma,
-    Nonlinear Dynamics 9 (1996) 113-130).
-    """
-    m, bw, rw, wanted, before = r.model, r.work.bodies, r.work.rows, vector_at(target, r.stages.target.size), 0.0
-    solve_once(r, wanted)
+@inlined
+def refine(r, target):
+    """Take out again what relaxation of the multiplier matrix does to a solution (method of multipliers; Bayo & Ledesma,
+    Nonlinear Dynamics 9 (1996) 113-130)."""
+    m, bw, rw, before = r.model, r.work.bodies, r.work.rows, 0.0
     for number in range(1, PASSES):
         constraint_rates(m.bodies.where, m.markers, m.rows, rw.jac, r.work.markers.phi, bw.acc, rw.left)
-        add_scaled(rw.left, rw.left, -1.0, wanted)
+        add_scaled(rw.left, rw.left, -1.0, target)
         subtract_yield(m.rows, rw, rw.lam, rw.left)
         left = largest(rw.left)
-        if number > 1 and not left < 0.5 * before:
+        if number > 1 and not left < SETTLES * before:
             break
         before = left
         copy(bw.more, bw.acc)
@@ -285,6 +289,29 @@ def solve_of_dependent_rows(r: Tables, target: Vector) -> int:
         add_scaled(bw.acc, bw.more, 1.0, bw.acc)
         gather_rows(m.rows.start, rw.step, rw.left)
         add_scaled(rw.lam, rw.lam, 1.0, rw.left)
+
+
+@solve.where(has_dependent_rows)
+def solve_of_dependent_rows(r: Tables, target: Vector) -> int:
+    """Where rows depend on one another: the smallest multipliers, weighted by the diagonal of S, of those that give acc.
+
+    What rows contradict one another by, as after a drift within the tolerance, has grown by the inverse of the relaxation in
+    the combinations that do nothing. So the system is solved once more for the accelerations of the reactions, which have
+    none of it.
+    """
+    m, bw, rw = r.model, r.work.bodies, r.work.rows
+    wanted = vector_at(target, r.stages.target.size)
+    solve_once(r, wanted)
+    refine(r, wanted)
+    copy(bw.solved, bw.acc)
+    reduce_miss(m.rows, bw, rw.step, rw.lam)
+    react(m.bodies, m.markers, m.rows, bw, r.work.markers.phi, rw)
+    constraint_rates(m.bodies.where, m.markers, m.rows, rw.jac, r.work.markers.phi, bw.acc, rw.reacted)
+    add_scaled(rw.left, rw.reacted, -2.0, rw.reacted)
+    project(r, rw.left)
+    gather_rows(m.rows.start, rw.step, rw.lam)
+    refine(r, rw.reacted)
+    copy(bw.acc, bw.solved)
     return OK
 
 

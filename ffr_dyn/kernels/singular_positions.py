@@ -80,6 +80,17 @@ def note_passing(share, t):
 
 
 @inlined
+def keep_closest(share, positions, passed, t, x):
+    """Keep the position x of an evaluation at time t where it is the closest to a singular one so far; for good where that
+    has been passed, after so many that were `passed` before it."""
+    if positions.shape[0] > 0:
+        if share[PASSED] > passed and passed < MOST_PASSED:
+            copy(positions[int(passed)], positions[MOST_PASSED])
+        if share[LOW_AT] == t:
+            copy(positions[MOST_PASSED], x)
+
+
+@inlined
 def is_beside(share, before):
     return share < BESIDE and share < CLOSER * before
 

@@ -205,6 +205,7 @@ class BodyWork(NamedTuple):
     rigid: F2
     more: F1  # (V,) scratch
     settled: F1  # (V,) scratch where damping couples elastic coordinates
+    solved: F1  # (V,) scratch where rows depend on one another
 
 
 class MarkerWork(NamedTuple):
@@ -247,6 +248,7 @@ class RowWork(NamedTuple):
     gamma: F1  # (C,)
     lam: F1  # (C,)
     left: F1  # (C,) scratch
+    reacted: F1  # (C,) scratch where rows depend on one another
     scale: F1  # (8 K,) what the entry of S on the diagonal is at least
     least: F1  # (8 K,) what it is taken for where it is less
     compliance: F1  # (8 K,) of the rows of stiff forces 1 / (gamma h d + (gamma h)^2 k)
@@ -304,6 +306,9 @@ class Work(NamedTuple):
     # the share at its start, the least of its stages, that at the start of the step before (`kernels.singular_positions`);
     # the least since it was high, when, and the largest since it was low; how many singular positions were passed, and when
     independence: F1
+    # (65, X) positions closest to the singular ones that were passed, the last of what may become one; no rows where it
+    # takes no positions to tell them from those where only the rows that were kept depend on one another
+    passed: F2
 
 
 class Stages(NamedTuple):

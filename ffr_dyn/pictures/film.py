@@ -244,7 +244,10 @@ def film_at(
     drawn = {*result.geometry, *(part for parts in in_parts.values() for part in parts)}
     links = tuple(_link(result, name, times) for name in _bodies(result) if name not in drawn)
     if not solids and not links:
-        raise InputError("nothing to animate: the result has no body (quantities <body>.R and <body>.p)")
+        raise InputError(
+            "nothing to animate: the result has no body (quantities <body>.R and <body>.p); run the scene with "
+            "outputs = [\"default\"], or --keep 'BODY.R' --keep 'BODY.p' beside others"
+        )
     deflections = [_largest_displacement(solid) for solid in solids]
     factor = _automatic_scale(solids, deflections) if scale == "auto" else float(scale)
     paths = {name: result[f"{name}.position"] for name in traces}
@@ -256,7 +259,9 @@ def film_at(
 
 def _require_rows(result: Result) -> None:
     if result.time.size == 0:
-        raise InputError("nothing to animate: the result has no rows")
+        raise InputError(
+            "nothing to animate: the result has no rows; its run was stopped before the first: run the scene again"
+        )
 
 
 # ---- colours ------------------------------------------------------------------------------------------------------

@@ -41,7 +41,7 @@ from ffr_prep.common.errors import ComputationError, InputError
 from ffr_prep.common.hdf5 import check_heaps
 from ffr_prep.common.interrupts import undisturbed
 from ffr_prep.common.outputs import check_output, replacing, writing
-from ffr_prep.common.reading import not_of_its_ending
+from ffr_prep.common.reading import nearest_file, not_of_its_ending
 
 FORMAT = "ffr-result"
 FORMAT_VERSION = 1
@@ -90,7 +90,9 @@ def _reading(path: Path) -> Iterator[h5py.File]:
     if path.is_dir():
         raise InputError(f"{path} is a folder; name a result file in it")
     if not path.is_file():
-        raise InputError(f"result file {path} does not exist")
+        raise InputError(
+            f"result file {path} does not exist; make it with `ffr-dyn run SCENE.toml -o {path.name}`{nearest_file(path)}"
+        )
     try:
         check_heaps(path)
         with h5py.File(path, "r") as file:

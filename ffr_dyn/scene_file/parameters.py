@@ -16,6 +16,19 @@ _REFERENCE = re.compile(r"\$\{\s*([^{}]*?)\s*\}")
 _NAME = re.compile(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)*")
 
 
+class WithUnit(float):
+    """A number in SI units that remembers the unit it was given in."""
+
+    unit: str
+
+
+def with_unit(value: float, unit: str) -> WithUnit:
+    """The number in SI units."""
+    found = WithUnit(to_si(value, unit))
+    found.unit = unit
+    return found
+
+
 def flattened(table: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
     """{"crank": {"length": 0.15}} -> {"crank.length": 0.15}. Raises InputError for names that formulas cannot hold."""
     found: dict[str, Any] = {}
@@ -67,7 +80,8 @@ class Parameters(Mapping[str, Any]):
         if not isinstance(value, str):
             return value
         try:
-            return as_number(value, self, f"parameters.{name}")
+            quantity = split_quantity(value)
+            return with_unit(*quantity) if quantity else as_number(value, self, f"parameters.{name}")
         except InputError as error:
             if "depends on itself" in str(error):
                 raise
@@ -97,13 +111,22 @@ def substituted(value: Any, parameters: Mapping[str, Any], where: str) -> Any:
 
 def as_number(text: str, parameters: Mapping[str, Any], what: str, unit: str | None = None) -> float:
     """A number from a text: with a unit ("120 mm"), or a formula of parameters, in SI units."""
-    quantity = split_quantity(text)
-    if quantity is not None:
-        try:
+    quantity, named = split_quantity(text), parameters.get(text.strip())
+    try:
+        if quantity is not None:
             return to_si(*quantity, unit)
-        except InputError as error:
-            raise InputError(f"{what}: {text!r}: {error}") from None
+        if isinstance(named, WithUnit):
+            return fitting(named, unit)
+    except InputError as error:
+        raise InputError(f"{what}: {text!r}: {error}") from None
     return number(text, parameters, what)
+
+
+def fitting(value: float, unit: str | None) -> float:
+    """The value. Raises InputError for one that was given in a unit of another dimension."""
+    if isinstance(value, WithUnit):
+        to_si(1.0, value.unit, unit)
+    return float(value)
 
 
 def nearest(name: str, known: Mapping[str, Any]) -> str:

@@ -127,7 +127,11 @@ def _signals(table: Mapping[str, Any], parameters: Parameters) -> dict[str, Time
         if name in (*parameters, "t", *CONSTANTS, *FUNCTIONS):
             raise InputError(f"inputs.{name}: formulas know that name already; give the input another")
     start = {name: as_number(v, parameters, f"inputs.{name}") if isinstance(v, str) else v for name, v in table.items()}
-    return {name: signal(name, value) for name, value in start.items() if type(value) in (int, float)}
+    return {
+        name: signal(name, value)
+        for name, value in start.items()
+        if isinstance(value, (int, float)) and not isinstance(value, bool)
+    }
 
 
 def _explained(error: ValidationError, source: Source) -> str:

@@ -41,37 +41,90 @@ from ffr_dyn.scene.joints import Joint
 from ffr_dyn.scene.sensors import Measurement, SectionMeasurement, StressMeasurement
 from ffr_dyn.scene_file.values import (
     THREE,
-    TWO,
     In,
     Inertia,
     Metres,
     Number,
-    OfTime,
+    Quantity,
     Seconds,
     Vector,
+    each,
     of_motion,
     of_time,
     or_curve,
+    six,
 )
 from ffr_prep.common.strict import Strict
 
 Direction = Vector | list[Vector]
+
+
+@dataclass(frozen=True)
+class Coupled:
+    """Unit of the `ratio` or the `offset` of a coupling, by its two joint coordinates."""
+
+    which: str
+
+    def of(self, entry: Mapping[str, Any]) -> str:
+        first, second = (_unit_of_coordinate(entry.get(key)) for key in ("first", "second"))
+        if "" in (first, second):
+            return "1 or m/rad or m or rad/m or 1/m" if self.which == "ratio" else "rad or m"
+        if self.which == "offset":
+            return second
+        return "1" if first == second else "m/rad or m" if second == "m" else "rad/m or 1/m"
+
+
+@dataclass(frozen=True)
+class Named:
+    """Unit of the quantity or the input that another field names by its last word; any where that says nothing."""
+
+    field: str
+
+    def of(self, entry: Mapping[str, Any]) -> str:
+        words = [word for word in str(entry.get(self.field)).split(".") if word not in "xyz"]
+        return BY_WORD.get(words[-1] if words else "", "")
+
+
+# Units of what results and inputs are called.
+BY_WORD = {
+    **{"position": "m", "velocity": "m/s", "acceleration": "m/s^2", "base": "m/s^2"},
+    **{"displacement": "m", "stroke": "m", "stroke_rate": "m/s", "stroke_acceleration": "m/s^2"},
+    **{"angle": "rad", "angle_rate": "rad/s", "angle_acceleration": "rad/s^2", "omega": "rad/s"},
+    **{"force": "N", "moment": "N m", "power": "W", "total": "J", "kinetic": "J", "strain": "J"},
+}
+
+
+def _unit_of_coordinate(name: Any) -> str:
+    return {"angle": "rad", "stroke": "m"}.get(str(name).rpartition(".")[2], "")
+
 
 # ---- tables of the file from dataclasses --------------------------------------------------------------------------
 
 # Types of the fields that the dataclasses leave open, by "Class.field"; forces and joints say them themselves
 # (`ffr_dyn.scene.fields`).
 FIELDS: dict[str, Any] = {
-    "Driver.function": OfTime,
+    "Driver.function": of_time(said.COORDINATE),
+    "Coupling.ratio": Annotated[float, In(Coupled("ratio"))],
+    "Coupling.offset": Annotated[float, In(Coupled("offset"))],
+    "MarkerEffort.direction": Vector,
+    "Bounded.before": Seconds | None,
+    "Bounded.after": Seconds | None,
+    "Causal.tolerance": Number,
+    "Causal.growth": Number,
+    "Periodic.period": Seconds,
+    "Periodic.step": Seconds,
     "PointDriver.x": of_time("m"),
     "PointDriver.y": of_time("m"),
     "PointDriver.z": of_time("m"),
     "StressMeasurement.point": Metres,
     "SectionMeasurement.point": Metres,
-    "MarkerEffort.direction": Vector,
     "Event.quantity": str,
+    "Event.value": Annotated[float, In(Named("quantity"))],
+    "Forced.amplitude": Annotated[float, In(Named("input"))],
     "Event.direction": Literal["rising", "falling", "either"],
 }
+
+DECIDE = ("coordinate", "first", "second")  # fields on which units of others depend; they are read first
 
 # Fields that a file cannot hold: Python functions, and the name, which is the key of the entry.
 NOT_IN_FILES = ("name", "function")
@@ -153,19 +206,24 @@ def _given(hint: Any) -> Any:
     match hint:
         case said.In(unit):
             return Annotated[float, In(unit)]
+        case said.Curved(unit, at, force):
+            return or_curve(unit, at, force)
+        case said.Six():
+            return six(hint)
         case said.OfTime(unit):
             return of_time(unit)
         case said.OfMotion(unit):
             return of_motion(unit)
         case said.Three(of):
             return Annotated[list[_given(of)], THREE]  # type: ignore[misc]
+        case said.OneOrMore(of):
+            return _given(of) | list[_given(of)]  # type: ignore[misc]
         case said.Direction():
             return Direction
     if hint is float:
-        return Number
+        return Quantity
     if said_more := getattr(hint, "__metadata__", ()):
-        curved = Curve in typing.get_args(hint.__origin__)
-        return or_curve(said_more[0].unit) if curved else _given(said_more[0])
+        return _given(said_more[0])
     parts = typing.get_args(hint)
     if not parts:
         return hint
@@ -179,7 +237,7 @@ def entry_model(kind: Kind) -> type[BaseModel]:
     """The model of an entry of this kind."""
     hints = _hints(kind.made)
     keys: dict[str, Any] = {"kind": (Literal[kind.word], kind.word)} if kind.word else {}
-    for f in keys_of(kind):
+    for f in sorted(keys_of(kind), key=lambda f: f.name not in DECIDE):
         keys[f.name] = (_type(kind, f, hints), ... if f.default is MISSING else _default(f))
     return create_model(f"{kind.made.__name__}Entry", __base__=Strict, __doc__=kind.made.__doc__, **keys)
 
@@ -246,9 +304,9 @@ class BodyEntry(Strict):
     q: list[Number] | None = None
     q_dot: list[Number] | None = None
     damping: Number | list[Number] = 0.0
-    rayleigh: Annotated[list[Number], TWO] | None = None
+    rayleigh: each("1/s", "s") | None = None  # type: ignore[valid-type]
     loss_factor: Annotated[float, Key(ge=0)] = 0.0
-    damping_bands: list[Annotated[list[Number], TWO]] = []
+    damping_bands: list[each("Hz", "1")] = []  # type: ignore[valid-type]
     stiffening: bool = True
     drop: list[Literal["I3", "I4", "I5", "I8", "I9"]] = []
 
@@ -283,7 +341,7 @@ class StabilisationEntry(Strict):
     """
 
     kind: Literal["projection", "baumgarte", "none"] = "projection"
-    tolerance: Annotated[Number, Key(gt=0)] = 1e-9
+    tolerance: Annotated[float, In("m or rad or 1"), Key(gt=0)] = 1e-9
     alpha: Annotated[float, In("1/s"), Key(gt=0)] | None = None
     beta: Annotated[float, In("1/s"), Key(gt=0)] | None = None
 
@@ -362,6 +420,11 @@ class _Integrated(_Span):
             if name not in known:
                 there = f"it has {', '.join(known)}" if known else "it has none"
                 raise ValueError(f"settings: {self.method} has no setting {name!r}; {there}")
+        for f in [] if controlled else fields(METHODS[self.method]):
+            is_text = isinstance(f.default, str)
+            if f.name in self.settings and isinstance(self.settings[f.name], str) != is_text:
+                wanted = "a text" if is_text else "a number, without a unit"
+                raise ValueError(f"settings: {f.name} of {self.method} is {wanted}, not {self.settings[f.name]!r}")
         return self
 
 
@@ -386,15 +449,16 @@ def _analysis_model(word: str, made: Any) -> type[BaseModel]:
     if over_time and made.stabilised:
         keys["stabilisation"] = (StabilisationEntry, StabilisationEntry())
     for f in fields(made):
-        keys[f.name] = _own_key(f, hints[f.name])
+        keys[f.name] = _own_key(f, hints[f.name], FIELDS.get(f"{made.__name__}.{f.name}"))
         if names := f.metadata.get("names"):
             keys[names] = (Annotated[list[str], Key(description=f"names of {names} of the scene, beside these")], [])
     return create_model(f"{made.__name__}Entry", __base__=base, __doc__=made.__doc__, **keys)
 
 
-def _own_key(f: Field[Any], hint: Any) -> tuple[Any, Any]:
-    """Type and default of the key for a field of an analysis, with what its option says of it."""
+def _own_key(f: Field[Any], hint: Any, known: Any) -> tuple[Any, Any]:
+    """Type, where it is known, and default of the key for a field of an analysis, with what its option says of it."""
     given, default = _bare_key(f, hint)
+    given = known or given
     said = f.metadata.get("help")
     return (Annotated[given, Key(description=said.replace("; repeat", ""))] if said else given), default
 
@@ -424,7 +488,7 @@ class _ChartEntry(Strict):
     """
 
     measures: list[str] = []
-    methods: dict[str, list[Annotated[Number, Key(gt=0)]]] = {}
+    methods: dict[str, list[Annotated[float, In("s or 1"), Key(gt=0)]]] = {}
     modes: Annotated[list[Annotated[int, Key(ge=0)] | Literal["all"]], Key(min_length=1)] = ["all"]
     drop: list[list[Literal["I3", "I4", "I5", "I8", "I9", "stiffening"]]] = []
 
@@ -454,7 +518,7 @@ class _SceneBase(Strict):
     name: str = "scene"
     include: list[str] = []
     parameters: dict[str, Any] = {}
-    inputs: dict[str, Number] = {}
+    inputs: dict[str, Quantity] = {}
     outputs: list[str] = ["default"]
     gravity: Annotated[list[of_time("m/s^2")], THREE] = [0.0, 0.0, 0.0]  # type: ignore[valid-type]
     base_acceleration: Annotated[list[of_time("m/s^2")], THREE] = [0.0, 0.0, 0.0]  # type: ignore[valid-type]
@@ -471,7 +535,7 @@ def scene_entry() -> Any:
 
 @cache
 def _scene_entry(words: tuple[str, ...], method_names: tuple[str, ...], forces: tuple[type, ...]) -> Any:
-    steps = dict[Literal[method_names], list[Annotated[Number, Key(gt=0)]]]  # type: ignore[valid-type]
+    steps = dict[Literal[method_names], list[Annotated[float, In("s or 1"), Key(gt=0)]]]  # type: ignore[valid-type]
     chart: Any = create_model("ChartEntry", __base__=_ChartEntry, __doc__=_ChartEntry.__doc__, methods=(steps, {}))
     one = _one_of([_analysis_model(word, analysis(word)) for word in words], words)
     return create_model(

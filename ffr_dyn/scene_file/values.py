@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
@@ -10,6 +10,7 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import (
     AfterValidator,
+    BeforeValidator,
     Discriminator,
     GetCoreSchemaHandler,
     GetJsonSchemaHandler,
@@ -23,7 +24,8 @@ from pydantic_core import CoreSchema, core_schema
 from ffr_dyn.functions.curves import Curve
 from ffr_dyn.functions.formula import Expression, is_constant, parse
 from ffr_dyn.functions.time_functions import HARMONIC, TimeFunction, constant, harmonic, piecewise, polynomial, table
-from ffr_dyn.scene_file.parameters import as_number
+from ffr_dyn.scene.fields import Six, Unit
+from ffr_dyn.scene_file.parameters import WithUnit, as_number, fitting
 from ffr_prep.common.errors import InputError
 from ffr_prep.common.reading import reading
 from ffr_prep.common.strict import Strict
@@ -34,19 +36,27 @@ from ffr_prep.common.units import split_quantity
 class In:
     """Marks a number that may be given as text as well: with a unit of the same dimension, or as a formula of parameters."""
 
-    unit: str | None = None
+    unit: Unit | None = None
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         return core_schema.with_info_before_validator_function(self._read, handler(source))
 
     def __get_pydantic_json_schema__(self, core: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
-        unit = {} if self.unit is None else {"unit": self.unit}
-        return {"anyOf": [{"type": "number"}, {"type": "string"}]} | unit
+        found = unit_of(self.unit, {})
+        return {"anyOf": [{"type": "number"}, {"type": "string"}]} | ({"unit": found} if found else {})
 
     def _read(self, value: Any, info: ValidationInfo) -> Any:
         if isinstance(value, bool):
             raise ValueError("must be a number")
-        return as_number(value, parameters_of(info), "it", self.unit) if isinstance(value, str) else value
+        unit = unit_of(self.unit, info.data or {})
+        if not isinstance(value, str):
+            return fitting(value, unit) if isinstance(value, float) else value
+        return as_number(value, parameters_of(info), "it", unit)
+
+
+def unit_of(unit: Unit | None, entry: Mapping[str, Any]) -> str | None:
+    """The unit, which may depend on the fields of the entry that have been read before."""
+    return unit if unit is None or isinstance(unit, str) else unit.of(entry) or None
 
 
 def parameters_of(info: ValidationInfo) -> Mapping[str, Any]:
@@ -54,10 +64,10 @@ def parameters_of(info: ValidationInfo) -> Mapping[str, Any]:
     return found
 
 
-TWO = Key(min_length=2, max_length=2)
 THREE = Key(min_length=3, max_length=3)
 
-Number = Annotated[float, In()]
+Number = Annotated[float, In("1")]
+Quantity = Annotated[float, In()]  # in a unit that something else decides
 Seconds = Annotated[float, In("s")]
 Vector = Annotated[list[Number], THREE]
 Metres = Annotated[list[Annotated[float, In("m")]], THREE]
@@ -74,11 +84,11 @@ class HarmonicEntry(Strict):
     mean : added to it
     """
 
-    amplitude: Number
+    amplitude: Quantity
     frequency: Annotated[float, In("Hz")] | None = None
     speed: Annotated[float, In("rad/s")] | None = None
     phase: Annotated[float, In("rad")] = 0.0
-    mean: Number = 0.0
+    mean: Quantity = 0.0
 
     @model_validator(mode="after")
     def _one(self) -> HarmonicEntry:
@@ -94,8 +104,8 @@ class PiecewiseEntry(Strict):
     coefficients : for each piece, as many numbers
     """
 
-    breaks: list[Number]
-    coefficients: list[list[Number]]
+    breaks: list[Seconds]
+    coefficients: list[list[Quantity]]
 
 
 class FunctionEntry(Strict):
@@ -110,9 +120,9 @@ class FunctionEntry(Strict):
     """
 
     formula: str | None = None
-    polynomial: list[Number] | None = None
+    polynomial: list[Quantity] | None = None
     harmonic: HarmonicEntry | None = None
-    table: tuple[list[Seconds], list[Number]] | None = None
+    table: tuple[list[Seconds], list[Quantity]] | None = None
     table_file: Path | None = None
     piecewise: PiecewiseEntry | None = None
 
@@ -150,15 +160,51 @@ def _of_time(value: float | str | FunctionEntry, info: ValidationInfo) -> float 
     return found.data[0] if is_constant(found) else found
 
 
-def _in_unit(unit: str | None) -> Callable[[float | str | FunctionEntry, ValidationInfo], Any]:
-    """A text that is a number with a unit becomes a number in SI units, if the unit is of this dimension."""
+def _fits(unit: Unit | None) -> BeforeValidator:
+    """Refuses a function of time with a number in a unit of another dimension, wherever in it that stands."""
 
-    def read(value: float | str | FunctionEntry, info: ValidationInfo) -> Any:
-        if isinstance(value, str) and split_quantity(value) is not None:
-            return as_number(value, parameters_of(info), "it", unit)
+    def check(value: Any, info: ValidationInfo) -> Any:
+        wanted = unit_of(unit, info.data or {})
+        if wanted is not None:
+            check_units(_of_function(value, wanted), info)
         return value
 
-    return read
+    return BeforeValidator(check)
+
+
+def check_units(given: Iterable[tuple[Any, str]], info: ValidationInfo) -> None:
+    """InputError for a text, of (text, unit), that is a number in a unit of another dimension."""
+    for text, unit in given:
+        parameters = parameters_of(info)
+        if isinstance(text, float):
+            fitting(text, unit)
+        elif isinstance(text, str) and (split_quantity(text) or isinstance(parameters.get(text.strip()), WithUnit)):
+            as_number(text, parameters, "it", unit)
+
+
+def _of_function(value: Any, unit: str) -> Iterator[tuple[Any, str]]:
+    """All that is written in a function of time, each with its unit."""
+    if not isinstance(value, dict):
+        yield value, unit
+        return
+    yield value.get("formula"), unit
+    yield from _of_powers(value.get("polynomial"), unit)
+    for number in listed(value.get("table"))[1:2]:
+        yield from ((one, unit) for one in listed(number))
+    harmonic, pieces = (given if isinstance(given := value.get(key), dict) else {} for key in ("harmonic", "piecewise"))
+    yield from ((harmonic.get(key), unit) for key in ("amplitude", "mean"))
+    for row in listed(pieces.get("coefficients")):
+        yield from _of_powers(row, unit)
+
+
+def _of_powers(coefficients: Any, unit: str) -> Iterator[tuple[Any, str]]:
+    for k, number in enumerate(listed(coefficients)):
+        yield number, " or ".join(f"{one}/s^{k}" for one in unit.split(" or "))
+
+
+def listed(value: Any) -> list[Any]:
+    """The value where it is a list, and none where it is not, which is refused elsewhere."""
+    return list(value) if isinstance(value, (list, tuple)) else []
 
 
 def _tabled(entry: FunctionEntry) -> TimeFunction:
@@ -199,17 +245,14 @@ _Given = Annotated[
 ]
 
 
-def of_time(unit: str | None = None) -> Any:
+def of_time(unit: Unit | None = None) -> Any:
     """The type of a function of time: a number with or without a unit of this dimension, a formula of t, a table."""
-    return Annotated[_Given, AfterValidator(_in_unit(unit)), AfterValidator(_of_time)]
+    return Annotated[_Given, _fits(unit), AfterValidator(_of_time)]
 
 
-def of_motion(unit: str | None = None) -> Any:
+def of_motion(unit: Unit | None = None) -> Any:
     """As `of_time`, with formulas of the motion too."""
-    return Annotated[_Given, AfterValidator(_in_unit(unit)), AfterValidator(_expression)]
-
-
-OfTime = of_time()
+    return Annotated[_Given, _fits(unit), AfterValidator(_expression)]
 
 
 class CurveEntry(Strict):
@@ -219,12 +262,50 @@ class CurveEntry(Strict):
     values : the force there
     """
 
-    at: list[Number]
-    values: list[Number]
+    at: list[Quantity]
+    values: list[Quantity]
 
 
-def or_curve(unit: str | None = None) -> Any:
-    """The type of a factor, such as a stiffness: a number, or a curve in its place."""
+def or_curve(unit: Unit | None = None, at: Unit | None = None, force: Unit | None = None) -> Any:
+    """The type of a factor, such as a stiffness: a number, or a curve of a force over places in its place."""
+
+    def check(value: Any, info: ValidationInfo) -> Any:
+        for key, of in (("at", at), ("values", force)):
+            if isinstance(value, dict) and (wanted := unit_of(of, info.data or {})) is not None:
+                check_units(((one, wanted) for one in listed(value.get(key))), info)
+        return value
+
     plain, curve = Annotated[float, In(unit)], Annotated[CurveEntry, AfterValidator(lambda e: Curve(e.at, e.values))]
     which = Discriminator(lambda given: "[curve]" if isinstance(given, (dict, CurveEntry, Curve)) else "[number]")
-    return Annotated[Annotated[plain, Tag("[number]")] | Annotated[curve, Tag("[curve]")], which]
+    return Annotated[
+        Annotated[Annotated[plain, Tag("[number]")] | Annotated[curve, Tag("[curve]")], which], BeforeValidator(check)
+    ]
+
+
+def six(said: Six) -> Any:
+    """The type of three components in one unit and three in another, or of a (6, 6) matrix of them."""
+    halves = [(said.three, said.between), (said.between, said.others)]
+
+    def check(value: Any, info: ValidationInfo) -> Any:
+        for k, one in enumerate(listed(value)):
+            row = halves[k // 3 % 2]
+            check_units(((number, row[c // 3 % 2]) for c, number in enumerate(listed(one))), info)
+            check_units([(one, row[k // 3 % 2])], info)
+            for key, units in (("at", said.at), ("values", said.forces)):
+                if isinstance(one, dict):
+                    check_units(((number, units[k // 3 % 2]) for number in listed(one.get(key))), info)
+        return value
+
+    entry = or_curve() if said.at[0] else Quantity
+    given: Any = list[entry] | list[list[Quantity]] if said.between else list[entry]  # type: ignore[valid-type]
+    return Annotated[given, BeforeValidator(check)]
+
+
+def each(*units: str) -> Any:
+    """The type of as many numbers, each in its unit."""
+
+    def check(value: Any, info: ValidationInfo) -> Any:
+        check_units(zip(listed(value), units, strict=False), info)
+        return value
+
+    return Annotated[list[Quantity], BeforeValidator(check), Key(min_length=len(units), max_length=len(units))]

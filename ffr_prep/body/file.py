@@ -23,7 +23,7 @@ from ffr_prep.body.reduced import (
 )
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.outputs import note_input, replacing
-from ffr_prep.common.reading import not_of_its_ending
+from ffr_prep.common.reading import nearest_file, not_of_its_ending
 from ffr_prep.common.stored_arrays import read_arrays
 
 MAGIC = "ffr-body"
@@ -146,7 +146,9 @@ def load_body(path: str | Path) -> FlexibleBody:
     try:
         return _with_parts(*_read(path))
     except FileNotFoundError:
-        raise BodyError(f"body file {path} does not exist") from None
+        raise BodyError(
+            f"body file {path} does not exist; make it with `ffr-prep reduce`, or name one that is there{nearest_file(path)}"
+        ) from None
     except (PermissionError, IsADirectoryError) as error:
         raise BodyError(f"body file {path} cannot be read ({error.strerror})") from None
     except BodyError as error:

@@ -6,6 +6,7 @@ import stat
 import tomllib
 from collections.abc import Iterator
 from contextlib import contextmanager
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,7 @@ from ffr_prep.common.outputs import note_input
 _MOST_TOML, _MOST_TEXT = 1 << 25, 1 << 31  # bytes
 _DEEPEST = 40  # tables and lists within each other
 _LARGEST = 1 << 63
-_SHOWN = 200
+_SHOWN, _LISTED = 200, 5
 _CAD = "a CAD file, of which `ffr-prep reduce` makes a body"
 _ENDINGS = {
     ".ffr": "a body file, which a scene names (file = ...) and `ffr-prep info` describes",
@@ -70,13 +71,27 @@ def check_ordinary(path: str | Path, what: str) -> None:
     try:
         mode = Path(path).stat().st_mode
     except (FileNotFoundError, NotADirectoryError):
-        raise InputError(f"{path} does not exist; give {what}") from None
+        raise InputError(f"{path} does not exist; give {what}{nearest_file(path)}") from None
     except (OSError, ValueError) as error:
         raise InputError(f"{str(path)[:_SHOWN]!r} cannot be read ({error})") from None
     if not stat.S_ISREG(mode):
         kind = "a folder" if stat.S_ISDIR(mode) else "no ordinary file"
         raise InputError(f"{path} is {kind}; give {what}")
     note_input(path)
+
+
+def nearest_file(path: str | Path) -> str:
+    """A hint at the file that is meant by one that does not exist: the nearest of its kind in its folder, or all; empty
+    where there is none."""
+    path = Path(path)
+    try:
+        there = sorted(one.name for one in path.parent.iterdir() if one.suffix == path.suffix and path.suffix)
+    except OSError:
+        return f"; there is no folder {str(path.parent)!r}" if not path.parent.exists() else ""
+    close = get_close_matches(path.name, there, 1)
+    if close:
+        return f"; did you mean {close[0]!r}?"
+    return f"; in its folder are {', '.join(there[:_LISTED])}" if there else ""
 
 
 def read_text(path: str | Path, what: str, most: int = _MOST_TEXT) -> str:

@@ -76,11 +76,11 @@ def split_quantity(text: str) -> tuple[float, str] | None:
 def to_si(value: float, unit: str, expected: str | None = None) -> float:
     """The value in SI units. `unit` such as "mm", "N/mm", "kg m^2", "rpm"; a "/" divides by the unit after it.
 
-    expected : a unit of the same dimension, or None for any
+    expected : a unit of the same dimension, several with " or " between them, or None for any
     Raises InputError for an unknown unit, with the nearest known one, and for one of another dimension.
     """
     factor, dimension = _parsed(unit)
-    if expected is not None and dimension != _parsed(expected)[1]:
+    if expected is not None and dimension not in [_parsed(one)[1] for one in expected.split(" or ")]:
         raise InputError(
             f"the unit {unit!r} does not fit: this is given in {expected if expected != '1' else 'numbers'}"
         )

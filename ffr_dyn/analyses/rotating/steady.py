@@ -55,7 +55,7 @@ class Steady(OfMoment):
 def steady(
     scene: Scene,
     *,
-    speeds: Sequence[float] = (),
+    speeds: Sequence[float | str] = (),
     turn: str = "",
     time: float = 0.0,
     outputs: Sequence[str] = ("default",),
@@ -102,7 +102,7 @@ def steady(
         "status": "complete",
     }
     plain = result_of(assembled.system, joined(rows), attributes, None, outputs)
-    values = np.array(list(speeds) or [found[0][1].machine.screws.fastest])
+    values = np.array(speed_list(speeds) or [found[0][1].machine.screws.fastest])
     return with_quantities(plain, {"speed": Quantity(values, "rad/s", (), "of what turns")}, path)
 
 
@@ -132,11 +132,11 @@ def growing(found: Found) -> str:
 
 
 def steady_states(
-    scene: Scene, speeds: Sequence[float], turn: str = "", time: float = 0.0
+    scene: Scene, speeds: Sequence[float | str], turn: str = "", time: float = 0.0
 ) -> Iterator[tuple[Assembled, Found]]:
     """The scene in space and its steady state, at every speed, each beginning where the last one ended."""
     last = None
-    for one in [at_speed(scene, float(speed), turn, time) for speed in speeds] or [scene]:
+    for one in [at_speed(scene, speed, turn, time) for speed in speed_list(speeds)] or [scene]:
         assembled = assemble(in_space(one), time=time)
         found = steady_state(assembled, time, last)
         last = found.x

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Annotated, Any
 
-from ffr_dyn.scene.fields import OfMotion
+from ffr_dyn.scene.fields import DAMPING, FORCE, STIFFNESS, In, OfMotion
 from ffr_dyn.scene.force_kinds import register_force
 from ffr_dyn.scene.forces.checks import check_function, check_number
 from ffr_dyn.scene.forces.force import Force, LawNumbers, LoadTable, Moment
@@ -37,11 +37,11 @@ class Actuator(Force):
 
     name: str
     joint: str
-    force: Annotated[Any, OfMotion()] = 0.0
+    force: Annotated[Any, OfMotion(FORCE)] = 0.0
     function: Callable[..., Any] | None = None
     coordinate: str = "angle"
-    stiffness: float = 0.0
-    damping: float = 0.0
+    stiffness: Annotated[float, In(STIFFNESS)] = 0.0
+    damping: Annotated[float, In(DAMPING)] = 0.0
 
     def __post_init__(self) -> None:
         check_function(self.force, f"{self.place.who}: force")

@@ -9,7 +9,7 @@ import numpy as np
 
 from ffr_dyn.functions.curves import Curve, curve_slope, curve_value
 from ffr_dyn.functions.rotation import triad
-from ffr_dyn.scene.fields import Direction
+from ffr_dyn.scene.fields import Direction, Six
 from ffr_dyn.scene.force_kinds import register_force
 from ffr_dyn.scene.forces.checks import check_array, check_symmetric
 from ffr_dyn.scene.forces.force import Force, LawNumbers, LoadTable, Moment
@@ -53,9 +53,9 @@ class Bushing(Force):
     name: str
     i: str
     j: str
-    stiffness: Annotated[Any, list[float | Curve] | list[list[float]]]
-    damping: Annotated[Any, list[float] | list[list[float]]] = (0.0,) * 6
-    preload: Annotated[Any, list[float]] = (0.0,) * 6
+    stiffness: Annotated[Any, Six("N/m", "N m/rad or N m", "N or N/rad", ("m", "rad"), ("N", "N m"))]
+    damping: Annotated[Any, Six("N s/m", "N m s/rad or N m s", "N s or N s/rad")] = (0.0,) * 6
+    preload: Annotated[Any, Six("N", "N m")] = (0.0,) * 6
     axes: Annotated[Any, Direction()] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
     axes_j: Annotated[Any, Direction()] = None
 

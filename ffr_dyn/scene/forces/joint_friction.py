@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from ffr_dyn.scene.fields import OfTime
+from ffr_dyn.scene.fields import COULOMB, DAMPING, RATE, In, OfTime
 from ffr_dyn.scene.force_kinds import register_force
 from ffr_dyn.scene.forces.checks import check_function, check_number, check_positive
 from ffr_dyn.scene.forces.force import Force, LawNumbers, LoadTable, Moment
@@ -44,12 +44,12 @@ class JointFriction(Force):
 
     name: str
     joint: str
-    coulomb: float
-    creep: float
+    coulomb: Annotated[float, In(COULOMB)]
+    creep: Annotated[float, In(RATE)]
     normal: Annotated[Any, OfTime("N")] = 1.0
-    static: float | None = None
-    stribeck: float | None = None
-    viscous: float = 0.0
+    static: Annotated[float | None, In(COULOMB)] = None
+    stribeck: Annotated[float | None, In(RATE)] = None
+    viscous: Annotated[float, In(DAMPING)] = 0.0
     coordinate: str = "angle"
 
     def __post_init__(self) -> None:

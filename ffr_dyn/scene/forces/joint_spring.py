@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 from ffr_dyn.functions.curves import Curve
+from ffr_dyn.scene.fields import COORDINATE, DAMPING, FORCE, RATE, STIFFNESS, Curved, In
 from ffr_dyn.scene.force_kinds import register_force
 from ffr_dyn.scene.forces.checks import check_damping, check_number, check_number_or_curve
 from ffr_dyn.scene.forces.force import Force, LawNumbers, LoadTable, Moment
@@ -34,10 +36,10 @@ class JointSpring(Force):
 
     name: str
     joint: str
-    stiffness: float | Curve = 0.0
-    damping: float | Curve = 0.0
-    free: float = 0.0
-    preload: float = 0.0
+    stiffness: Annotated[float | Curve, Curved(STIFFNESS, COORDINATE, FORCE)] = 0.0
+    damping: Annotated[float | Curve, Curved(DAMPING, RATE, FORCE)] = 0.0
+    free: Annotated[float, In(COORDINATE)] = 0.0
+    preload: Annotated[float, In(FORCE)] = 0.0
     coordinate: str = "angle"
     turns: int = 0
 

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
+from ffr_dyn.scene.fields import COORDINATE, DAMPING, STIFFNESS, In
 from ffr_dyn.scene.force_kinds import register_force
 from ffr_dyn.scene.forces.checks import check_number, check_positive
 from ffr_dyn.scene.forces.force import Force, LawNumbers, LoadTable, Moment
@@ -38,11 +40,11 @@ class JointStop(Force):
 
     name: str
     joint: str
-    stiffness: float
-    entry: float
-    lower: float | None = None
-    upper: float | None = None
-    damping: float = 0.0
+    stiffness: Annotated[float, In(STIFFNESS)]
+    entry: Annotated[float, In(COORDINATE)]
+    lower: Annotated[float | None, In(COORDINATE)] = None
+    upper: Annotated[float | None, In(COORDINATE)] = None
+    damping: Annotated[float, In(DAMPING)] = 0.0
     coordinate: str = "angle"
     turns: int = 0
 

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from ffr_dyn.scene.fields import OfTime, PerMode
+from ffr_dyn.scene.fields import In, OfTime, PerMode
 from ffr_dyn.scene.force_kinds import register_force
 from ffr_dyn.scene.forces.checks import check_array, check_function
 from ffr_dyn.scene.forces.distributed import Affine, check_integrals, compiled_integrals, law_of_integrals
@@ -36,8 +36,8 @@ class ModalForce(Force):
 
     name: str
     body: str
-    values: Annotated[Any, list[float], PerMode()]
-    function: Annotated[Any, OfTime()] = 1.0
+    values: Annotated[Any, list[In("1")], PerMode()]
+    function: Annotated[Any, OfTime("1")] = 1.0
 
     def __post_init__(self) -> None:
         who = f"force {self.name!r}"

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from ffr_dyn.scene.fields import OfTime, Three
+from ffr_dyn.scene.fields import In, OfTime, Three
 from ffr_dyn.scene.force_kinds import register_force
 from ffr_dyn.scene.forces.checks import check_array, check_function
 from ffr_dyn.scene.forces.distributed import (
@@ -53,8 +53,8 @@ class NodalForces(Force):
     name: str
     body: str
     points: Annotated[Any, list[int]]
-    forces: Annotated[Any, list[Three(float)]]
-    function: Annotated[Any, OfTime()] = 1.0
+    forces: Annotated[Any, list[Three(In("N"))]]
+    function: Annotated[Any, OfTime("1")] = 1.0
     axes: str = "global"
 
     def __post_init__(self) -> None:

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from ffr_dyn.scene.fields import OfTime
+from ffr_dyn.scene.fields import In, OfTime, OneOrMore
 from ffr_dyn.scene.force_kinds import register_force
 from ffr_dyn.scene.forces.checks import check_array, check_function
 from ffr_dyn.scene.forces.distributed import (
@@ -54,9 +54,9 @@ class Pressure(Force):
 
     name: str
     body: str
-    pressure: Annotated[Any, float | list[float]]
+    pressure: Annotated[Any, OneOrMore(In("Pa"))]
     triangles: Annotated[Any, list[int] | str] = None
-    function: Annotated[Any, OfTime()] = 1.0
+    function: Annotated[Any, OfTime("1")] = 1.0
     follower: bool = False
 
     def __post_init__(self) -> None:

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from ffr_dyn.scene.fields import OfTime
+from ffr_dyn.scene.fields import COORDINATE, DAMPING, FORCE, STIFFNESS, In, OfTime
 from ffr_dyn.scene.force_kinds import register_force
 from ffr_dyn.scene.forces.checks import check_function, check_number
 from ffr_dyn.scene.forces.force import Force, LawNumbers, LoadTable, Moment
@@ -38,10 +38,10 @@ class Servo(Force):
 
     name: str
     joint: str
-    target: Annotated[Any, OfTime()]
-    kp: float
-    kd: float = 0.0
-    limit: float = np.inf
+    target: Annotated[Any, OfTime(COORDINATE)]
+    kp: Annotated[float, In(STIFFNESS)]
+    kd: Annotated[float, In(DAMPING)] = 0.0
+    limit: Annotated[float, In(FORCE)] = np.inf
     coordinate: str = "angle"
     turns: int = 0
 

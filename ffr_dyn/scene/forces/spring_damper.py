@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from ffr_dyn.functions.curves import Curve
-from ffr_dyn.scene.fields import In
+from ffr_dyn.scene.fields import Curved, In
 from ffr_dyn.scene.force_kinds import register_force
 from ffr_dyn.scene.forces.checks import check_damping, check_number, check_number_or_curve
 from ffr_dyn.scene.forces.force import Force, LawNumbers, LoadTable, Moment
@@ -43,8 +43,8 @@ class SpringDamper(Force):
     name: str
     i: str
     j: str
-    stiffness: Annotated[float | Curve, In("N/m")]
-    damping: Annotated[float | Curve, In("N s/m")] = 0.0
+    stiffness: Annotated[float | Curve, Curved("N/m", "m", "N")]
+    damping: Annotated[float | Curve, Curved("N s/m", "m/s", "N")] = 0.0
     free_length: Annotated[float, In("m")] = 0.0
     preload: Annotated[float, In("N")] = 0.0
 

@@ -44,16 +44,29 @@ from ffr_dyn.consistency.assemble import assemble
 from ffr_dyn.consistency.force_jacobian import force_jacobian
 from ffr_dyn.functions.formula import formula
 from ffr_dyn.functions.time_functions import polynomial
-from ffr_dyn.integrators import RK4, ROS2, DormandPrince, tolerances
+from ffr_dyn.integrators import RK4, ROS2, DormandPrince, HalfExplicit, tolerances
 from ffr_dyn.integrators.stabilisation import Drifting
 from ffr_dyn.results.result import Result
 from ffr_dyn.scene.drivers import Driver
-from ffr_dyn.scene.forces import Load
+from ffr_dyn.scene.forces import JointSpring, Load
 from ffr_dyn.scene.joints import Joint
 from ffr_dyn.scene.scene import Body, Scene
 from ffr_dyn.variants.variant import vary
 
 p = partial
+
+
+def damped(method: object) -> Result:
+    """By more than explicit steps bear."""
+    damper = JointSpring("damper", "hinge", damping=1e7)
+    return run(replace(HINGED, gravity=(0, -9.81, 0), forces=(damper,)), method)
+
+
+def tumbled(step: float) -> Result:
+    """A free body that turns by hundreds of radians in the longer step."""
+    fast = (replace(TUMBLING.bodies[0], omega_bar=(1e5, 2e5, 3e5)),)
+    return run(replace(TUMBLING, bodies=fast), RK4(step), 100 * step, 10 * step)
+
 
 # ---- runs that go on ----------------------------------------------------------------------------------------------------
 
@@ -161,6 +174,12 @@ def doored(elastic: object) -> Result:
 
 def weighed(law: Callable[..., object]) -> Result:
     return static(hanging(0.0, Load("wind", "rod.b", function=law)))
+
+
+def kinked(law: Callable[..., object]) -> Result:
+    """A hinge with a spring, under a moment."""
+    spring, moment = JointSpring("spring", "hinge", stiffness=100.0), Load("load", "bar.b", function=law)
+    return static(replace(HINGED, forces=(spring,), loads=(moment,)))
 
 
 def pinned(far: tuple[float, float, float]) -> object:
@@ -285,6 +304,10 @@ OTHER = [
     Case(p(felt, beside), lambda: felt(lambda t, state: (0.1, 0, 0))),
     Case(p(pinned, (50.0, 0, 0)), p(pinned, APART)),
     Case(p(pushed, 0.0), p(pushed, 0.3)),
+    Case(
+        p(kinked, lambda t, s: (0, 10.0 * np.sign(0.05 - s.position("bar.b")[1]), 0)),
+        p(kinked, lambda t, s: (0, 1.0, 0)),
+    ),
     Case(lambda: assemble(vary(SPACE, drop=("I3",))), lambda: assemble(vary(SPACE, drop=("I3", "I4")))),
     Case(p(twisted, 1e5, "quasi-static"), p(twisted, 1e5, "as-given")),
     Case(p(diverging, 1e5), p(diverging, 1e2)),
@@ -292,6 +315,8 @@ OTHER = [
     Case(p(cut, 0.9, end=1.0, output_step=0.1), p(cut, 1e-6, end=0.01)),
     Case(p(loose, 0.9), p(loose, 1e-3)),
     Case(p(run, HUGE), p(run, HINGED)),
+    Case(p(damped, HalfExplicit(1e-3)), p(damped, ROS2(1e-3))),
+    Case(p(tumbled, 1e-3), p(tumbled, 1e-8)),
     Case(lambda: run(locking(), RK4(1e-3), 0.5, stabilisation=Drifting()), lambda: run(locking(), RK4(1e-3))),
 ]
 

@@ -1,0 +1,69 @@
+"""What is told names the cause: small jumps of drivers, explicit forces that are too stiff, energy of negative springs."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import ffr_dyn as fd
+import ffr_prep as fp
+
+BLOCK = fp.rigid_body("block", mass=1.0, inertia=(0.1, 0.1, 0.1), points={"a": np.zeros(3)})
+ORIGIN = {"o": (0, 0, 0)}
+
+
+def sliding(x: float = 0.0, **more) -> fd.Scene:
+    guide = fd.Joint("guide", "translational", "ground.o", "block.a", axis=(1, 0, 0))
+    return fd.Scene((fd.Body("block", BLOCK, position=(x, 0, 0)),), (guide,), ground=ORIGIN, **more)
+
+
+def step_of(size: float) -> fd.TimeFunction:
+    return fd.piecewise(np.array([0, 0.5, 1.0]), np.array([[0.0], [size]]))
+
+
+@pytest.mark.parametrize("size", [0.02, 0.05])
+def test_a_small_jump_of_a_driver_is_told_as_a_jump(size):
+    """No smaller step helps it."""
+    free = fd.Scene((fd.Body("block", BLOCK),), (), ground=ORIGIN)
+    point = fd.PointDriver("d", "ground.o", "block.a", x=step_of(size), y=0.0, z=0.0)
+    for scene in (
+        sliding(drivers=(fd.Driver("d", "guide", step_of(size), coordinate="stroke"),)),
+        fd.Scene(free.bodies, ground=ORIGIN, drivers=(point,)),
+    ):
+        result = fd.forward(scene, end=1.0, output_step=0.01, method=fd.ROS2(1e-3))
+        assert any(f"driver 'd' jumps by {size:g} m at t = 0.5 s" in note for note in result.attributes["notes"])
+
+
+@pytest.mark.parametrize("size", [0.15, 0.2, 0.3, 0.5, 2.0])
+def test_a_jump_that_no_run_can_go_on_from_is_told_as_one(size):
+    scene = sliding(drivers=(fd.Driver("d", "guide", step_of(size), coordinate="stroke"),))
+    for how in ({}, {"method": fd.ROS2(1e-3)}):
+        with pytest.raises(fd.ComputationError, match=rf"driver 'd' jumps by {size:g} m at t = 0.5 s"):
+            fd.forward(scene, end=1.0, output_step=0.01, **how)
+
+
+@pytest.mark.parametrize("method", [fd.RK4(1e-3), fd.HalfExplicit(1e-3), fd.Variational(1e-3)])
+def test_steps_that_fail_by_a_damper_name_it(method):
+    hinge = fd.Joint("hinge", "revolute", "ground.o", "block.a")
+    damper = fd.JointSpring("damper", "hinge", damping=1e6)
+    body = fd.Body("block", BLOCK, omega_bar=(0, 0, 1.0))
+    scene = fd.Scene((body,), (hinge,), ground=ORIGIN, forces=(damper,))
+    with pytest.raises(fd.ComputationError, match=r"force 'damper' is too stiff for steps of 0.001 s"):
+        fd.forward(scene, end=0.1, output_step=0.01, method=method)
+
+
+def test_the_energy_of_a_negative_spring_is_energy():
+    """A block that runs away; what its steps leave is small against what it has taken out of the spring."""
+    spring = fd.JointSpring("spring", "guide", stiffness=-100.0, coordinate="stroke")
+    result = fd.forward(sliding(1e-6, forces=(spring,)), end=2.0, output_step=0.01)
+    assert not any("energy" in note for note in result.attributes["notes"])
+    np.testing.assert_allclose(result["guide.stroke"][-1], 1e-6 * np.cosh(20.0), rtol=1e-3)
+
+
+def test_statics_tells_a_force_that_jumps_from_a_motion_that_nothing_holds():
+    spring = fd.JointSpring("spring", "guide", stiffness=100.0, coordinate="stroke")
+    jumping = fd.Load("load", "block.a", function=lambda t, s: (10.0 * np.sign(0.05 - s.position("block.a")[0]), 0, 0))
+    with pytest.raises(
+        fd.ComputationError, match=r"a force jumps, has a kink or a pole near there, along guide\.stroke"
+    ):
+        fd.static(sliding(forces=(spring,), loads=(jumping,)))
