@@ -15,6 +15,7 @@ import pytest
 from places import ROOT
 
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+RECIPE = ROOT / "recipe" / "recipe.yaml"
 OTHER_NAMES = {"gmsh": "python-gmsh", "matplotlib": "matplotlib-base"}  # of conda-forge
 SCENE = """
 gravity = [0, -9.81, 0]
@@ -54,16 +55,14 @@ def bounds(dependencies: list[str]) -> dict[str, str]:
 def test_the_version_is_the_same_everywhere():
     version = PROJECT["version"]
     assert f"\nversion: {version}\n" in (ROOT / "CITATION.cff").read_text(encoding="utf-8")
-    assert f'set version = "{version}"' in (ROOT / "recipe" / "meta.yaml").read_text(encoding="utf-8")
+    assert f'\n  version: "{version}"\n' in RECIPE.read_text(encoding="utf-8")
     assert f"## {version} " in (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
 
 
 def test_the_recipe_and_the_oldest_versions_are_those_of_the_project():
     wanted = bounds(PROJECT["dependencies"])
-    recipe = (
-        (ROOT / "recipe" / "meta.yaml").read_text(encoding="utf-8").partition("  run:\n")[2].partition("\ntest:")[0]
-    )
-    run = bounds(re.findall(r"^    - (.*)$", recipe, re.M))
+    needed = RECIPE.read_text(encoding="utf-8").partition("  run:\n")[2].partition("\ntests:")[0]
+    run = bounds(re.findall(r"^    - (.*)$", needed, re.M))
     assert run.pop("python") == PROJECT["requires-python"]
     assert run == {OTHER_NAMES.get(name, name): bound for name, bound in wanted.items()}
     lines = (ROOT / "constraints-oldest.txt").read_text(encoding="utf-8").splitlines()
