@@ -258,7 +258,11 @@ def pendulum():
     scene = fd.Scene(
         (fd.Body("arm", arm),),
         (fd.Joint("hinge", "revolute", "ground.wall", "arm.hinge", axis=(0, 0, 1)),),
-        loads=(fd.Load("weight", "arm.tip", force=(0, -5.0, 0), axes="body"),),
+        loads=(
+            fd.Load("weight", "arm.tip", force=(0, -5.0, 0), axes="body"),
+            fd.Load("gust", "arm.tip", force=(fd.harmonic(amplitude=2.0, frequency=1.0), 0, 0)),
+            fd.Load("drag", "arm.tip", function=lambda t, state: -0.1 * state.velocity("arm.tip")),
+        ),
         springs=(fd.SpringDamper("spring", "ground.hook", "arm.tip", stiffness=20.0, free_length=0.5),),
         ground={"wall": (0, 0, 0), "hook": (1.0, 2.0, 0)},
         name="pendulum",
@@ -273,7 +277,10 @@ def test_joints_forces_and_markers_are_where_the_result_has_them():
     assert joint["label"] == "hinge (revolute)"
     np.testing.assert_allclose(page.array(*joint["axis"]).reshape(-1, 3), [[0, 0, 1]] * len(result.time), atol=1e-4)
     arrows = {arrow["name"]: arrow for arrow in page.about["arrows"]}
-    assert set(arrows) == {"hinge.force", "weight.force", "spring.tension"}
+    assert set(arrows) == {"hinge.force", "weight.force", "gust.force", "drag.force", "spring.tension"}
+    gust, drag = (page.array(*arrows[f"{name}.force"]["vector"]).reshape(-1, 3) for name in ("gust", "drag"))
+    np.testing.assert_allclose(gust[:, 0], 2.0 * np.sin(2 * np.pi * result.time), atol=1e-3)
+    np.testing.assert_allclose(drag, -0.1 * result["arm.tip.velocity"], atol=1e-3 * np.abs(drag).max())
     force = page.array(*arrows["hinge.force"]["vector"]).reshape(-1, 3)
     np.testing.assert_allclose(force, result["hinge.force"], atol=1e-3 * np.abs(result["hinge.force"]).max())
     pull, tip = page.array(*arrows["spring.tension"]["vector"]).reshape(-1, 3), result["arm.tip.position"]
