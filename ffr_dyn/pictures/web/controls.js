@@ -38,10 +38,7 @@ function turn(dx, dy) {
 // ---- controls -----------------------------------------------------------------------------------------------------------
 
 const VIEWS = { start: [about.camera.direction, about.camera.up], x: [[1, 0, 0], [0, 0, 1]], y: [[0, -1, 0], [0, 0, 1]], z: [[0, 0, 1], [0, 1, 0]], corner: [[0.75, -1, 0.6], [0, 0, 1]] };
-function seek(time) {
-  state.time = Math.min(Math.max(time, rows[0]), rows.at(-1));
-  redraw();
-}
+const seek = (time) => { state.time = Math.min(Math.max(time, rows[0]), rows.at(-1)); redraw(); };
 
 function step(by) {
   play(false);
@@ -60,16 +57,12 @@ function play(on) {
 
 function tick(now) {
   if (!state.playing) return;
-  if (last !== undefined) {
-    state.time += ((now - last) / 1000) * state.speed * span() / about.seconds;
-    if (state.time > rows.at(-1)) {
-      if (state.loop) state.time = rows[0] + ((state.time - rows[0]) % span());
-      else { state.time = rows.at(-1); play(false); }
-    }
-  }
+  const time = state.time + (last === undefined ? 0 : ((now - last) / 1000) * state.speed * span() / about.seconds);
   last = now;
+  if (time > rows.at(-1) && !state.loop) { state.time = rows.at(-1); return play(false); }
+  state.time = time > rows.at(-1) ? rows[0] + ((time - rows[0]) % span()) : time;
   draw();
-  if (state.playing) requestAnimationFrame(tick);
+  requestAnimationFrame(tick);
 }
 
 function setScale(scale) {
@@ -83,8 +76,7 @@ function setScale(scale) {
 function setColouring(k) {
   const colour = about.colours[k];
   state.colour = k;
-  $("limit").disabled = !colour.map;
-  $("limit").value = colour.map ? short(state.limits[k] * colour.factor) : "";
+  Object.assign($("limit"), { disabled: !colour.map, value: colour.map ? short(state.limits[k] * colour.factor) : "" });
   $("unit").textContent = colour.unit || "";
   redraw();
 }
@@ -92,22 +84,18 @@ function setColouring(k) {
 /** A list of things with a box each, and one for all. */
 function list(title, things, open) {
   if (!things.length) return;
-  const whole = document.createElement("details"), head = document.createElement("summary"), all = document.createElement("input");
+  const [whole, first] = ["list", "item"].map((id) => $(id).content.firstElementChild.cloneNode(true));
+  const [all, words] = whole.firstElementChild.children;
   whole.open = open;
-  all.type = "checkbox";
-  all.checked = things.every((thing) => thing.shown !== false && thing.shown !== undefined);
-  head.append(all, ` ${title} (${things.length})`);
-  whole.append(head);
+  words.textContent = `${title} (${things.length})`;
+  all.checked = things.every((thing) => thing.shown);
   const boxes = things.map((thing) => {
-    const label = document.createElement("label"), box = document.createElement("input"), swatch = document.createElement("i");
-    box.type = "checkbox";
-    box.checked = thing.shown === true;
+    const label = first.cloneNode(true), [box, swatch, name] = label.children;
+    Object.assign(box, { checked: thing.shown, onchange: () => { thing.shown = box.checked; redraw(); } });
     box.dataset.name = thing.name;
-    box.onchange = () => { thing.shown = box.checked; redraw(); };
-    swatch.className = "swatch";
-    swatch.style.background = thing.colour || "transparent";
-    label.append(box, " ", ...(thing.colour ? [swatch] : []), thing.label || thing.name);
-    label.title = thing.label || thing.name;
+    swatch.hidden = !thing.colour;
+    swatch.style.background = thing.colour;
+    label.title = name.textContent = thing.label || thing.name;
     whole.append(label);
     return box;
   });
@@ -122,16 +110,10 @@ function lists() {
   list("Forces, moments", about.arrows, false);
   list("Markers", about.markers, false);
   list("Paths", about.traces, true);
-  const whole = document.createElement("details"), select = document.createElement("select");
-  whole.open = true;
-  whole.innerHTML = "<summary>Plots</summary>";
-  select.id = "series";
-  select.multiple = true;
-  about.series.forEach((one, k) => select.add(new Option(`${one.name} [${one.unit}]`, k, false, one.chosen)));
-  select.onchange = () => { drawPlots(); redraw(); };
-  whole.append(select);
-  whole.hidden = !about.series.length || rows.length < 2;
-  $("lists").append(whole);
+  about.series.forEach((one, k) => $("series").add(new Option(`${one.name} [${one.unit}]`, k, false, one.chosen)));
+  $("series").onchange = () => { drawPlots(); redraw(); };
+  $("plotted").hidden = !about.series.length || rows.length < 2;
+  $("lists").append($("plotted"));
 }
 
 function connect() {

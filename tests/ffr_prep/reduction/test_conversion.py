@@ -201,6 +201,19 @@ def test_the_examples_of_the_documentation_run(tmp_path, monkeypatch):
 # ---- guards -----------------------------------------------------------------------------------------------------------
 
 
+def test_interfaces_are_found_where_they_are(bodies):
+    body = bodies[next(iter(bodies))]
+    near, far = body.interfaces[:2]
+    place = "nearest " + ",".join(f"{x:.17g}" for x in far.position)
+    np.testing.assert_array_equal(
+        with_reference(body, FixedTo(place)).omega2, with_reference(body, FixedTo(far.name)).omega2
+    )
+    told = with_reference(body, SimplySupported(near.name, place)).provenance["reference"]
+    assert told == with_reference(body, SimplySupported(near.name, far.name)).provenance["reference"]
+    with pytest.raises(InputError, match="name the one that is meant|finds no node"):
+        with_reference(body, FixedTo("plane z=0"))
+
+
 def test_conditions_that_cannot_be(bodies):
     body = bodies[FixedTo("left")]
     with pytest.raises(InputError, match="need the mesh"):
