@@ -210,7 +210,7 @@ def test_interfaces_are_found_where_they_are(bodies):
     )
     told = with_reference(body, SimplySupported(near.name, place)).provenance["reference"]
     assert told == with_reference(body, SimplySupported(near.name, far.name)).provenance["reference"]
-    with pytest.raises(InputError, match="name the one that is meant|finds no node"):
+    with pytest.raises(InputError, match=r"name the one that is meant|finds no node"):
         with_reference(body, FixedTo("plane z=0"))
 
 
