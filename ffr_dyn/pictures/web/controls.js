@@ -1,6 +1,6 @@
 // Pictures, one after the other, and what steers them.
 
-let wanted = false;
+let wanted = false, last; // whether a picture is on its way; when the last one of a film was drawn
 const redraw = () => { if (!wanted) { wanted = true; requestAnimationFrame(() => { wanted = false; draw(); }); } };
 
 function draw() {
@@ -14,7 +14,8 @@ function draw() {
   drawOver(at, width, height);
   $("now").style.left = `${across(state.time)}px`;
   $("time").value = state.time;
-  $("clock").textContent = about.moments[Math.round(at.row + at.share * (at.next - at.row))] || `${short(about.clock.factor * state.time)} ${about.clock.unit}`;
+  const moment = about.moments[Math.round(at.row + at.share * (at.next - at.row))];
+  $("clock").textContent = moment || `${short(about.clock.factor * state.time)} ${about.clock.unit}`;
   state.drawn += 1;
 }
 
@@ -29,7 +30,8 @@ function look(direction, up) {
 
 function turn(dx, dy) {
   const [right, up, towards] = camera.axes;
-  const by = (a, b, angle) => [add(a.map((c) => c * Math.cos(angle)), b, Math.sin(angle)), add(b.map((c) => c * Math.cos(angle)), a, -Math.sin(angle))];
+  const mix = (a, b, angle) => add(a.map((c) => c * Math.cos(angle)), b, Math.sin(angle));
+  const by = (a, b, angle) => [mix(a, b, angle), mix(b, a, -angle)];
   const [right2, towards2] = by(right, towards, 0.008 * dx), [up2, towards3] = by(up, towards2, -0.008 * dy);
   camera.axes = [unit(right2), unit(up2), unit(towards3)];
   redraw();
@@ -37,7 +39,8 @@ function turn(dx, dy) {
 
 // ---- controls -----------------------------------------------------------------------------------------------------------
 
-const VIEWS = { start: [about.camera.direction, about.camera.up], x: [[1, 0, 0], [0, 0, 1]], y: [[0, -1, 0], [0, 0, 1]], z: [[0, 0, 1], [0, 1, 0]], corner: [[0.75, -1, 0.6], [0, 0, 1]] };
+const [UP, { direction, up }] = [[0, 0, 1], about.camera];
+const VIEWS = { start: [direction, up], x: [[1, 0, 0], UP], y: [[0, -1, 0], UP], z: [UP, [0, 1, 0]], corner: [[0.75, -1, 0.6], UP] };
 const seek = (time) => { state.time = Math.min(Math.max(time, rows[0]), rows.at(-1)); redraw(); };
 
 function step(by) {
@@ -46,7 +49,6 @@ function step(by) {
   seek(rows[Math.min(Math.max(row + (by < 0 && at.share > 0 && at.share < 1 ? 0 : by), 0), rows.length - 1)]);
 }
 
-let last;
 function play(on) {
   state.playing = on && span() > 0;
   if (state.playing && state.time >= rows.at(-1)) state.time = rows[0];
@@ -105,11 +107,9 @@ function list(title, things, open) {
 }
 
 function lists() {
-  list("Bodies", about.bodies, true);
-  list("Joints", about.joints, about.joints.length < 20);
-  list("Forces, moments", about.arrows, false);
-  list("Markers", about.markers, false);
-  list("Paths", about.traces, true);
+  const { bodies, joints, arrows, markers, traces } = about, small = joints.length < 20;
+  for (const [title, things, open] of [["Bodies", bodies, true], ["Joints", joints, small], ["Forces, moments", arrows, false],
+    ["Markers", markers, false], ["Paths", traces, true]]) list(title, things, open);
   about.series.forEach((one, k) => $("series").add(new Option(`${one.name} [${one.unit}]`, k, false, one.chosen)));
   $("series").onchange = () => { drawPlots(); redraw(); };
   $("plotted").hidden = !about.series.length || rows.length < 2;
@@ -118,7 +118,6 @@ function lists() {
 
 function connect() {
   about.colours.forEach((colour, k) => $("colour").add(new Option(colour.words, k)));
-  for (const speed of [0.05, 0.1, 0.25, 0.5, 1, 2, 4, 8]) $("speed").add(new Option(speed, speed, speed === 1, speed === 1));
   [$("time").min, $("time").max] = [rows[0], rows.at(-1)];
   $("play").onclick = () => play(!state.playing);
   $("back").onclick = () => step(-1);
@@ -129,7 +128,11 @@ function connect() {
   $("scale").onchange = () => setScale(Number($("scale").value));
   $("scaling").oninput = () => { const s = Number($("scaling").value); setScale(s > 0 ? 0.1 * (about.most / 0.1) ** (s / 100) : 0); };
   $("colour").onchange = () => setColouring(Number($("colour").value));
-  $("limit").onchange = () => { const v = Number($("limit").value) / about.colours[state.colour].factor; if (v > 0) state.limits[state.colour] = v; redraw(); };
+  $("limit").onchange = () => {
+    const limit = Number($("limit").value) / about.colours[state.colour].factor;
+    if (limit > 0) state.limits[state.colour] = limit;
+    redraw();
+  };
   for (const id of ["edges", "ghost", "names", "frames"]) { $(id).checked = about.boxes.includes(id); $(id).onchange = redraw; }
   for (const button of $("views").querySelectorAll("button")) button.onclick = () => look(...VIEWS[button.dataset.view]);
   $("plots").onpointerdown = $("plots").onpointermove = (event) => {

@@ -12,7 +12,7 @@ const MOST_SHAPES = 60, MOST_TENSORS = 40; // as in ffr_dyn/pictures/morphs.py
 const INK = "#222222";
 
 const about = JSON.parse($("about").textContent);
-let numbers; // ArrayBuffer of all arrays
+let numbers, rows; // ArrayBuffer of all arrays; times of the rows [s]
 
 async function unpack() {
   const packed = Uint8Array.from(atob($("numbers").textContent), (letter) => letter.charCodeAt(0));
@@ -46,7 +46,6 @@ function rotation(p) {
 // ---- what is shown, and when ------------------------------------------------------------------------------------------
 
 const state = { time: 0, playing: false, loop: true, speed: 1, scale: about.scale, colour: 0, limits: [], drawn: 0 };
-let rows; // times of the rows [s]
 const span = () => rows.at(-1) - rows[0];
 const camera = { axes: [], target: about.centre.slice(), reach: 1 }; // axes: right, up, towards the eye
 

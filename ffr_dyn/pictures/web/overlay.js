@@ -1,8 +1,7 @@
 // Lines and words over the bodies: joints, forces, markers, paths, the colour bar.
 
 const over = $("over").getContext("2d");
-let taken = []; // places and widths of words in a picture
-let pixels; // point in space -> point on the screen
+let taken = [], pixels; // places and widths of words in a picture; point in space -> point on the screen
 
 function line(points, colour, width = 1.5, dash = []) {
   Object.assign(over, { strokeStyle: colour, lineWidth: width });

@@ -4,8 +4,7 @@
 const smooth = $("solid").getContext("webgl2", { antialias: true, failIfMajorPerformanceCaveat: true });
 const gl = smooth || $("solid").getContext("webgl2", { antialias: false });
 const sharpness = () => (smooth || !state.playing ? 1 : 0.75);
-let blank; // a texture where no colour map is needed
-let motion, drawing; // programs, each with its uniforms
+let blank, motion, drawing; // a texture where no colour map is needed; programs, each with its uniforms
 
 function compiled(vertex, fragment, attributes, written) {
   const program = gl.createProgram(), uniforms = {};
@@ -74,10 +73,7 @@ function vertices(attributes, corners) {
 function loadSurface(surface) {
   const points = buffer(gl.ARRAY_BUFFER, array(surface.points)), moduli = surface.moduli && buffer(gl.ARRAY_BUFFER, array(surface.moduli));
   Object.assign(surface, { size: surface.points[2] / 3, count: surface.triangles[2], lines: surface.edges[2] });
-  const corners = new Uint32Array(surface.count + surface.lines);
-  corners.set(array(surface.triangles));
-  corners.set(array(surface.edges), surface.count);
-  surface.corners = buffer(gl.ELEMENT_ARRAY_BUFFER, corners);
+  surface.corners = buffer(gl.ELEMENT_ARRAY_BUFFER, Uint32Array.from([...array(surface.triangles), ...array(surface.edges)]));
   surface.still = vertices([[points, 3, 0, 0], [moduli, 2, 0, 0]]);
   surface.undeformed = vertices([[points, 3, 0, 0]], surface.corners);
   surface.shapeTexture = shapesTexture(array(surface.shapes));
@@ -124,7 +120,10 @@ function move(body, at) {
   });
   if (count) give(motion, { weights });
   if (tensors.length) give(motion, { stresses: between(body.tensors, tensors.length, at).map((w, k) => w * tensors[k]) });
-  [surface.shapeTexture, surface.tensorTexture, colour ? colour.texture : blank].forEach((of, k) => { gl.activeTexture(gl.TEXTURE0 + k); gl.bindTexture(gl.TEXTURE_2D, of); });
+  [surface.shapeTexture, surface.tensorTexture, colour ? colour.texture : blank].forEach((of, k) => {
+    gl.activeTexture(gl.TEXTURE0 + k);
+    gl.bindTexture(gl.TEXTURE_2D, of);
+  });
   gl.bindVertexArray(surface.still);
   gl.bindBufferBase(gl.TRANSFORM_FEEDBACK_BUFFER, 0, body.moved);
   gl.beginTransformFeedback(gl.POINTS);

@@ -6,6 +6,7 @@ import re
 import zlib
 from dataclasses import replace
 from html.parser import HTMLParser
+from importlib.resources import files
 from io import BytesIO
 
 import numpy as np
@@ -204,6 +205,14 @@ def test_a_page_holds_everything_and_fetches_nothing(tmp_path):
     (chosen,) = (series for series in page.about["series"] if series["chosen"])
     values = page.array(*chosen["values"])[chosen["column"] :: chosen["of"]]
     np.testing.assert_allclose(values, result["rod.tip.position.y"], atol=1e-4)
+
+
+def test_the_viewer_is_small():
+    """Lines of JavaScript but for comments, and the shaders."""
+    scripts = [of for of in files("ffr_dyn.pictures").joinpath("web").iterdir() if of.name.endswith(".js")]
+    lines = [line for of in scripts if of.name != "shaders.js" for line in of.read_text("utf-8").splitlines()]
+    assert len([line for line in lines if not re.match(r"\s*(//|/\*\*.*\*/|$)", line)]) <= 500
+    assert max(map(len, lines)) <= 150
 
 
 def test_titles_cannot_break_a_page():

@@ -115,6 +115,14 @@ def test_frames_of_beams_convert_with_their_section_forces():
     np.testing.assert_allclose(converted.surface.beams.modes * s, forces, atol=1e-6 * np.abs(forces).max())
 
 
+def test_models_of_every_kind_find_interfaces_where_they_are():
+    frame = fp.from_frame(space_frame(), regions("a", "b", "c"))
+    request = fp.Request(
+        name="f", reference=SimplySupported("nearest 0.1,0,0", "plane x=1.1"), reduction=CraigBampton(2)
+    )
+    assert fp.reduce(frame, request).provenance["reference"] == {"type": "SimplySupported", "pin": "a", "roller": "b"}
+
+
 def test_the_mean_axis_leaves_no_momentum(bodies):
     converted = with_reference(bodies[FixedTo("left")], MeanAxis())
     assert np.abs(converted.P_dm).max() < 1e-10
