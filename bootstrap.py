@@ -33,7 +33,7 @@ from typing import Iterator, Sequence
 
 HOME = Path(__file__).resolve().parent
 OLDEST = (3, 11)
-PYTHONS = ("python3", "python3.14", "python3.13", "python3.12", "python3.11")
+PYTHONS = ("python3", "python3.13", "python3.12", "python3.11", "python3.14")
 PYTHON_PACKAGES = ("python3.11", "python3.11-venv")
 
 # Shared libraries that the wheels of gmsh and VTK load from the system, and the Debian packages that bring them.

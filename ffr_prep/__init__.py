@@ -17,8 +17,8 @@ chooses its shapes; a number, `UpTo` or `Accuracy` says how many modes. Bodies a
 `with_reference` return others.
 
 `faces` tells what surfaces a part has; `InterfaceRegion("pin", "cylinder r=6mm at 0,0,0")` finds one by what it is, and
-`found_faces` tells which; `face_picture` and `face_page` show them; `region_triangles` are
-where a pressure acts. `rigid_part` makes a rigid body of a geometry.
+`found_faces` names its faces; `face_picture` and `face_page` show them; `region_triangles` finds the triangles of a body's
+surface on which a pressure acts. `rigid_part` makes a rigid body of a geometry.
 
 `register_reduction`, `register_mesh_format`, `register_matrix_format` and `register_exchange_format` add to what command
 line and files offer (CONTRIBUTING.md shows how). `dir(ffr_prep)` lists all names; `help(ffr_prep.reduce)` and the like

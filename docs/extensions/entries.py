@@ -1,32 +1,115 @@
-"""The page of all entries of a scene file, made from its schema and from the examples beside the reference."""
+"""Pages of all entries of a file, made from its schema and from the examples beside the reference."""
 
 from __future__ import annotations
 
 import json
 import re
 import tomllib
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-EXAMPLES = Path(__file__).resolve().parent.parent / "reference" / "examples.toml"
-HEAD = """# Entries of a scene file
+from pydantic import BaseModel
+
+from ffr_dyn.scene_file.schema import schema as scene_schema
+from ffr_dyn.studies.plan import BodyRecipe, StudyFile
+from ffr_prep.common.docstrings import meanings, prose
+from ffr_prep.model.material import KEYS, material_keys
+from ffr_prep.pipelines.structure_schema import structure_schema
+
+REFERENCE = Path(__file__).resolve().parent.parent / "reference"
+SCENE = """# Entries of a scene file
 
 Made from the declarations in the code, as is the [JSON schema](../scene.schema.json). [The scene file](../scene_file.md)
 tells how its parts work together. A number may be given as text with a unit of the same dimension or as a formula of the
 parameters; units are those that a plain number has. Keys without a default must be given.
 
 """
-AT_THE_TOP = "Scene"
+STRUCTURE = """# Entries of a structure file
+
+Made from the declarations in the code. [Beams, plates and bodies of several kinds](../structural.md) tells how its parts work
+together. Numbers are plain, in the unit that stands beside their meaning. Keys without a default must be given.
+
+"""
+MATERIAL = """# Entries of a material file
+
+Made from the declarations in the code. `--material FILE.toml` reads it; [Materials](../materials.md) tells more.
+
+"""
+STUDY = """# Entries of a study file
+
+Made from the declarations in the code. [Studies](../studies.md) tells how its parts work together. Keys without a default
+must be given.
+
+"""
 WORDS = {"string": "text", "integer": "whole number", "boolean": "true or false", "number": "number"}
 
 
-def page(schema: dict[str, Any]) -> str:
+@dataclass(frozen=True)
+class FileKind:
+    """A kind of file: the word of its page and of its examples, what stands above its entries, and its schema, whose root
+    has the name `top`; without one the entries of $defs are each a whole file."""
+
+    word: str
+    head: str
+    schema: dict[str, Any]
+    top: str | None = None
+
+    @property
+    def entries(self) -> dict[str, Any]:
+        """Name -> its schema."""
+        return ({self.top: self.schema} if self.top else {}) | self.schema.get("$defs", {})
+
+    @property
+    def examples(self) -> dict[str, str]:
+        """Name -> an example, or several."""
+        found: dict[str, str] = tomllib.loads((REFERENCE / f"{self.word}_examples.toml").read_text(encoding="utf-8"))
+        return found
+
+
+def kinds() -> list[FileKind]:
+    """All kinds of files that people write."""
+    materials = {"$defs": {f"{kind}Material": _material(*keys) for kind, keys in material_keys().items()}}
+    return [
+        FileKind("scene", SCENE, scene_schema(), "Scene"),
+        FileKind("structure", STRUCTURE, structure_schema().model_json_schema(), "Structure"),
+        FileKind("material", MATERIAL, materials),
+        FileKind("study", STUDY, _described(StudyFile, {"BodyRecipe": BodyRecipe}), "Study"),
+    ]
+
+
+def _material(needed: set[str], allowed: set[str]) -> dict[str, Any]:
+    words = {"name": {"type": "string"}, "elasticity": _rows(6), "axes": _rows(3)}
+    order = [key for key in KEYS if key in needed | allowed]
+    return {
+        "description": "The whole file.",
+        "required": sorted(needed),
+        "properties": {key: {**words.get(key, {"type": "number"}), "description": KEYS[key]} for key in order},
+    }
+
+
+def _rows(count: int) -> dict[str, Any]:
+    row = {"type": "array", "items": {"type": "number"}, "minItems": count, "maxItems": count}
+    return {"type": "array", "items": row}
+
+
+def _described(model: type[BaseModel], inside: dict[str, type[BaseModel]]) -> dict[str, Any]:
+    """The schema of a file whose keys are described in the docstrings of its models."""
+    made = model.model_json_schema()
+    for of, entry in [(model, made), *((inside[name], entry) for name, entry in made.get("$defs", {}).items())]:
+        entry["description"] = prose(of.__doc__)
+        for key, text in meanings(of.__doc__).items():
+            entry["properties"][key]["description"] = text
+    return made
+
+
+def page(kind: FileKind) -> str:
     """Markdown: a section for each entry, with the table of its keys and an example."""
-    definitions = {AT_THE_TOP: schema, **schema["$defs"]}
-    places, examples = _places(schema), _examples()
-    order = [AT_THE_TOP, *places, *sorted(set(definitions) - set(places) - {AT_THE_TOP})]
-    return HEAD + "\n".join(
-        _section(name, definitions[name], places.get(name), examples.get(name, "")) for name in order
+    places, examples = _places(kind.schema), kind.examples
+    order = dict.fromkeys([*([kind.top] if kind.top else []), *places, *sorted(kind.entries)])
+    return kind.head + "\n".join(
+        _section(name, kind.entries[name], places.get(name) or _parents(kind, name), examples.get(name, ""))
+        for name in order
     )
 
 
@@ -36,26 +119,40 @@ def title(name: str) -> str:
     return " ".join(words).capitalize()
 
 
-def _examples() -> dict[str, str]:
-    found: dict[str, str] = tomllib.loads(EXAMPLES.read_text(encoding="utf-8"))
-    return found
-
-
 def _places(schema: dict[str, Any]) -> dict[str, str]:
     """Entry -> where it stands in the file, of those that are tables of the scene."""
     found: dict[str, str] = {}
-    for table, of in schema["properties"].items():
+    for table, of in schema.get("properties", {}).items():
         for name in re.findall(r'"\$ref": "#/\$defs/(\w+)"', json.dumps(of)):
             if name != "FunctionEntry":
-                found.setdefault(name, f"[{table}]" if table in ("analysis", "chart") else f"[{table}.NAME]")
+                found.setdefault(name, _heading(table, of))
     return found
+
+
+def _heading(table: str, of: dict[str, Any]) -> str:
+    """How a table of the file begins."""
+    several = [option.get("type") for option in of.get("anyOf", [of])]
+    if "array" in several:
+        return f"`[[{table}]]`"
+    return f"`[{table}.NAME]`" if "object" in several else f"`[{table}]`"
+
+
+def _parents(kind: FileKind, name: str) -> str:
+    """The keys of other entries that hold this one."""
+    within = [
+        f"`{key}` of [{title(other).lower()}](#{other})"
+        for other, entry in kind.entries.items()
+        for key, of in entry["properties"].items()
+        if other != kind.top and f'"#/$defs/{name}"' in json.dumps(of)
+    ]
+    return ", ".join(within)
 
 
 def _section(name: str, entry: dict[str, Any], place: str | None, example: str) -> str:
     lines = [f"({name})=", f"## {title(name)}", ""]
     kind = entry.get("properties", {}).get("kind", {}).get("const")
     if place:
-        lines += [f"`{place}`" + (f' with `kind = "{kind}"`' if kind else ""), ""]
+        lines += [place + (f' with `kind = "{kind}"`' if kind else ""), ""]
     lines += [_text(entry.get("description", "")), "", "| key | value | default | meaning |", "|---|---|---|---|"]
     required = entry.get("required", [])
     for key, of in entry["properties"].items():
@@ -74,7 +171,8 @@ def _text(said: str) -> str:
 def _value(default: Any) -> str:
     if default in (None, [], {}):
         return "none"
-    return f"`{json.dumps(default)}`" if not isinstance(default, dict) else "its defaults"
+    inner = default[0] if isinstance(default, list) else default
+    return "its defaults" if isinstance(inner, dict) else f"`{json.dumps(default)}`"
 
 
 def _kind(of: dict[str, Any]) -> str:
@@ -109,7 +207,8 @@ def _choice(options: list[dict[str, Any]]) -> str:
 
 def _list(of: dict[str, Any]) -> str:
     if "prefixItems" in of:
-        return "list of " + " and ".join(map(_kind, of["prefixItems"]))
+        parts = list(map(_kind, of["prefixItems"]))
+        return f"list of {len(parts)} {_many(parts[0])}" if len({*parts}) == 1 else "list of " + " and ".join(parts)
     number = f"{of['minItems']} " if of.get("minItems") == of.get("maxItems") and "minItems" in of else ""
     return f"list of {number}{_many(_kind(of.get('items', {})))}"
 

@@ -15,12 +15,12 @@ import ffr_dyn
 import ffr_dyn.cli
 import ffr_prep
 import ffr_prep.cli
-from ffr_dyn.scene_file.schema import schema
 
 
 def pages() -> Iterator[tuple[str, str]]:
     """Name and text of each."""
-    yield "entries", entries.page(schema())
+    for kind in entries.kinds():
+        yield "entries" if kind.word == "scene" else f"{kind.word}_file", entries.page(kind)
     yield "ffr_prep_command", commands.page("ffr-prep", ffr_prep.cli.cli)
     yield "ffr_dyn_command", commands.page("ffr-dyn", ffr_dyn.cli.cli)
     yield "ffr_prep", doors.page(ffr_prep, "fp")

@@ -36,7 +36,7 @@ WIDTH = 4 * np.finfo(float).eps  # of a step, and relative: what brentq can reac
 class Event:
     """A moment at which `quantity` passes `value`.
 
-    value : in the unit of the quantity
+    value     : in the unit of the quantity, such as [m] of a position
     quantity  : a component of a result, such as "rod.tip.position.y" or "hinge.angle", or a Python function (t, state) ->
                 number; `state` is a `ffr_dyn.equations.state_view.StateView`
     direction : "rising", "falling" or "either"

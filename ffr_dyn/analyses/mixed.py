@@ -51,8 +51,8 @@ AT_ONCE = 2  # derivatives of known motions after which efforts that act on them
 class Causal:
     """Integrate the internal dynamics from the scene's own start (Dormand & Prince, order 8).
 
-    tolerance : relative, of a step
-    growth    : refuse internal dynamics that would magnify an error by more than this over the run
+    tolerance : relative, of a step [1]
+    growth    : refuse internal dynamics that would magnify an error by more than this over the run [1]
 
     >>> result = fd.mixed(scene, unknown=(torque,), end=0.5, output_step=1e-3, solution=fd.Causal(tolerance=1e-8))
     """

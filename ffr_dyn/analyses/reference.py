@@ -41,7 +41,7 @@ class SciPy:
     """A solver of `scipy.integrate.solve_ivp`: "DOP853" (explicit, order 8; Hairer, Norsett & Wanner 1993), "Radau"
     (implicit, order 5; Hairer & Wanner 1996), "LSODA" (Petzold 1983), ...
 
-    rtol, atol : its tolerances, of positions, velocities and elastic coordinates alike
+    rtol : its relative tolerance [1];  atol : its absolute one, of positions [m], velocities [m/s], elastic coordinates alike
 
     Raises InputError for another solver.
 

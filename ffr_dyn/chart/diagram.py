@@ -66,6 +66,8 @@ class Lost:
 class Diagram(Brief):
     """The points of a scene, those lost, and the reference that errors are measured from.
 
+    limits : errors that are tolerated, by measure, in its unit, such as [m]
+
     >>> fd.orders(diagram, "deflection:rod")  # of a diagram that `fd.work_precision` returned
     """
 
@@ -76,7 +78,7 @@ class Diagram(Brief):
     reference: Reference
     notes: tuple[str, ...] = ()
     chosen: tuple[str, ...] = field(default=())  # labels of points to be pointed out
-    limits: Mapping[str, float] = field(default_factory=dict)  # errors that are tolerated, by measure, in its unit
+    limits: Mapping[str, float] = field(default_factory=dict)
 
     def measure(self, name: str) -> Measure:
         """The measure of that name."""

@@ -31,7 +31,8 @@ def order_words(order: float) -> str:
 
 
 def orders(diagram: Diagram, measure: str) -> dict[tuple[str, str], float]:
-    """The observed order of every line (series, model) of a diagram whose methods take steps.
+    """The observed order [1] of every line (series, model) of a diagram whose methods take steps: the slope of the error over
+    the step.
 
     >>> fd.orders(diagram, "deflection:rod")
     """

@@ -21,6 +21,7 @@ from ffr_dyn.cli.sweep import sweep
 from ffr_prep.common.command import INPUT_FILE, OUTPUT_FILE, reserve, run_command
 from ffr_prep.common.errors import InputError
 from ffr_prep.common.registry import load_plugin
+from ffr_prep.common.units import pretty
 
 EXAMPLE = """\b
 Example:
@@ -122,8 +123,9 @@ def info(result: Path) -> None:
     from ffr_dyn.results.file import load_result
 
     loaded = load_result(result)
+    units = {name: f" {pretty(quantity.unit)}".rstrip() for name, quantity in loaded.quantities.items()}
     for key, value in sorted(loaded.attributes.items()):
-        for line in _attribute(key, value):
+        for line in _errors(value, units) if key == "errors" else _attribute(key, value):
             click.echo(f"{key:20} {line}")
     click.echo(f"{'rows':20} {loaded.time.size}, from {loaded.time[0]:g} to {loaded.time[-1]:g} s\n")
     for name, quantity in loaded.quantities.items():
@@ -197,6 +199,13 @@ def animate(
 
 for command in (run, check, show, export, list_methods, stress, chart, economise, parts, realtime, sweep):
     cli.add_command(command)
+
+
+def _errors(told: dict[str, list[float]], units: dict[str, str]) -> list[str]:
+    """Of each output the largest error in its unit, and as a share of the output's range."""
+    return [
+        f"{name}: {error:.3g}{units.get(name, '')}, {share:.3g} of its range" for name, (error, share) in told.items()
+    ]
 
 
 def _attribute(key: str, value: Any) -> list[str]:

@@ -6,7 +6,7 @@ Heavy bodies move least. Elastic coordinates are left alone wherever rigid motio
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse import block_diag, csr_array
+from scipy.sparse import block_diag, coo_array, csr_array
 
 from ffr_dyn.closing.constraints import Constraints, RowsAt, rows_at
 from ffr_dyn.closing.row_space import Matrix, smallest_solution
@@ -80,7 +80,7 @@ def weights(scene: Scene, place: Layout, x: Array, elastic: bool, dense: bool) -
     """W^(1/2) (V, V) with W the inverse mass matrix; zero for coordinates that may not move."""
     roots = [_root(body, x[place.q(b)], tuple(place.active(b)), elastic) for b, body in enumerate(scene.bodies)]
     if not dense:
-        return csr_array(block_diag(roots, format="csr"))
+        return csr_array(block_diag([coo_array(root) for root in roots], format="csr"))
     W = np.zeros((place.v_size, place.v_size))
     for first, root in zip(place.iv, roots, strict=True):
         W[first : first + len(root), first : first + len(root)] = root

@@ -142,6 +142,7 @@ def in_enough_parts(
 
     make    : the scene with these bodies in so many equal parts; with none at first
     analyse : such as `static`, or a forward run; its result keeps `*.q`
+    angle   : that an interface may turn by within its body [rad]
 
     Raises InputError as `parts_needed`; ComputationError where ever more parts are needed.
 

@@ -40,8 +40,8 @@ KEPT = ("*.R", "*.p", "*.v", "*.omega_bar", "*.position", "*.velocity", "energy.
 class Adaptation:
     """When modes enter and leave.
 
-    enter : share of a tolerance above which a mode that is left out enters
-    leave : share below which a mode that is there leaves; well below `enter`, so that it does not come back at once
+    enter : share of a tolerance above which a mode that is left out enters [1]
+    leave : share [1] below which a mode that is there leaves; well below `enter`, so that it does not come back at once
     rows  : output rows between two looks
 
     Raises InputError unless 0 < leave < enter <= 1 and rows is two or more.

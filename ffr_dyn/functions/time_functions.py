@@ -28,6 +28,7 @@ POLYNOMIAL, HARMONIC, PIECEWISE, USER, OPERATION = 0, 1, 2, 3, 4
 class TimeFunction(Brief):
     """A function of time as the kernels read it: its kind and its numbers; `callback` for a Python function.
 
+    data     : as the kind has them, in the unit of what the function is for, and times [s]
     operands : what an operation of a formula (data: its number, its parameter) works on
     name     : of an input of the scene, see `signal`
 
@@ -42,7 +43,7 @@ class TimeFunction(Brief):
 
 
 def constant(value: float) -> TimeFunction:
-    """The same value at all times.
+    """The same value at all times, in the unit of what it is for: a joint's angle [rad], a component of a force [N].
 
     >>> speed = fd.constant(150.0)
     """
@@ -50,7 +51,7 @@ def constant(value: float) -> TimeFunction:
 
 
 def polynomial(*coefficients: float) -> TimeFunction:
-    """c0 + c1 t + c2 t^2 + ...; `polynomial(0, 150)` is a crank that turns at 150 rad/s.
+    """c0 + c1 t + c2 t^2 + ..., t [s]; `polynomial(0, 150)` is a crank that turns at 150 rad/s.
 
     >>> angle = fd.polynomial(0, 150)
     """
@@ -122,7 +123,7 @@ def piecewise(breaks: Array, coefficients: Array) -> TimeFunction:
 
 
 def user(function: Callable[[float], object]) -> TimeFunction:
-    """A Python function t -> value, or t -> (value, rate, second derivative) where it drives a joint coordinate.
+    """A Python function of t [s] -> value, or -> (value, rate, second derivative) where it drives a joint coordinate.
 
     >>> push = fd.user(lambda t: 100.0 * np.exp(-t))
     """
@@ -130,7 +131,8 @@ def user(function: Callable[[float], object]) -> TimeFunction:
 
 
 def signal(name: str, value: float = 0.0) -> TimeFunction:
-    """An input of the scene, by name: it has its initial value until a `ffr_dyn.realtime.stepper.Stepper` sets another.
+    """An input of the scene, by name, in the unit of where it stands, such as [N]: it has its initial value until a
+    `ffr_dyn.realtime.stepper.Stepper` sets another.
 
     The same signal may stand in several places. Raises InputError for a name that is no word, or a value not finite.
 

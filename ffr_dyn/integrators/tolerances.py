@@ -40,7 +40,7 @@ class Tolerances:
 
 
 def tolerances(relative: float) -> Tolerances:
-    """All tolerances in the proportions of the default ones.
+    """All tolerances in the proportions of the default ones; relative : that of a step, a share of each quantity's size [1].
 
     >>> method = fd.AdaptiveROS3(fd.tolerances(1e-5))
     """

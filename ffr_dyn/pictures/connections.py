@@ -77,27 +77,28 @@ def _joint(result: Result, name: str, of: Mapping[str, Any], markers: Mapping[st
     return JointShown(name, of["kind"], label, markers[of["at"][0]], turned)
 
 
-def _turned(result: Result, body: str, axis: Array) -> Array:
-    """(T, 3) global axis of one (3,) that is fixed in a body."""
+def _turned(result: Result, body: str, vector: Array) -> Array:
+    """(T, 3) in global axes of a vector (3,) or its history (T, 3) in the axes of a body, of the ground by default."""
+    history = np.broadcast_to(vector, (result.time.size, 3))
     if f"{body}.p" not in result.quantities:
-        return np.tile(axis, (result.time.size, 1))
+        return history
     p = result[f"{body}.p"]
-    return np.asarray(rotation_matrix(p / np.linalg.norm(p, axis=1, keepdims=True)) @ axis)
+    A = rotation_matrix(p / np.linalg.norm(p, axis=1, keepdims=True))
+    return np.asarray(np.einsum("tij,tj->ti", A, history))
 
 
 def _arrows(result: Result, name: str, of: Mapping[str, Any], markers: Mapping[str, Array]) -> list[ArrowShown]:
-    """What acts on the last marker of a connection: what a result recorded, or what is said to be constant."""
+    """What acts on the last marker of a connection: what a result recorded, else what is said to be constant."""
     at, given = markers.get(of["at"][-1]) if of["at"] else None, of.get("constant", {})
     if at is None:
         return []
     found = []
     for what, unit in _VECTORS:
         recorded = result.quantities.get(f"{name}.{what}")
-        if recorded is not None and recorded.values.shape == at.shape and "axis" in of:
-            found.append(ArrowShown(f"{name}.{what}", unit, at, recorded.values))
-        elif what in given:
-            body = of["at"][-1].partition(".")[0] if of["axes"] == "body" else ""
-            found.append(ArrowShown(f"{name}.{what}", unit, at, _turned(result, body, np.asarray(given[what], float))))
+        vector = given.get(what) if recorded is None or recorded.values.shape != at.shape else recorded.values
+        if vector is not None and {"axis", "axes"} & of.keys():
+            body = of["at"][-1].partition(".")[0] if of.get("axes") == "body" else ""
+            found.append(ArrowShown(f"{name}.{what}", unit, at, _turned(result, body, np.asarray(vector, float))))
     if f"{name}.tension" in result.quantities and of["at"][0] in markers and len(of["at"]) == 2:
         found.append(_pull(f"{name}.tension", result[f"{name}.tension"], markers[of["at"][0]], at))
     return [arrow for arrow in found if np.isfinite(arrow.vector).all()]

@@ -7,6 +7,7 @@ from typing import Any
 from ffr_dyn.scene.drivers import Driver, PointDriver
 from ffr_dyn.scene.force_kinds import forces_of
 from ffr_dyn.scene.forces.given import is_number
+from ffr_dyn.scene.forces.load import Load
 from ffr_dyn.scene.joints import Joint, frames
 from ffr_dyn.scene.parts import wholes
 from ffr_dyn.scene.scene import Scene
@@ -44,7 +45,7 @@ def _joint(joint: Joint, drivers: list[str]) -> dict[str, Any]:
 
 
 def _force(force: Any, scene: Scene) -> dict[str, Any]:
-    """Its markers; of a load its axes and what of it is constant and not zero."""
+    """Its markers; of a load its axes, and what of it is constant and not zero, for scenes that have not run."""
     parts = {what: getattr(force, what, ()) for what in ("force", "moment")}
     constant = {
         what: [float(component) for component in of]
@@ -52,4 +53,6 @@ def _force(force: Any, scene: Scene) -> dict[str, Any]:
         if isinstance(of, tuple | list) and len(of) == 3 and all(map(is_number, of)) and any(of)
     }
     found: dict[str, Any] = {"kind": type(force).__name__, "at": list(force.place.markers(scene))}
-    return found | ({"constant": constant, "axes": force.axes} if constant else {})
+    return (
+        found | ({"axes": force.axes} if isinstance(force, Load) else {}) | ({"constant": constant} if constant else {})
+    )

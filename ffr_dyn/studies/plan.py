@@ -50,14 +50,28 @@ TAKEN = ("run", "row", "time", "message")  # columns that every table may have
 
 
 class BodyRecipe(BaseModel):
-    """How a body is made: a line of ffr-prep, without the name of the command and the output."""
+    """How a body is made, once for every distinct line.
+
+    make : a line of ffr-prep, without the name of the command and the output; "${name}" stands for a parameter
+    """
 
     model_config = ConfigDict(extra="forbid")
     make: str
 
 
 class StudyFile(BaseModel):
-    """The entries of a study file."""
+    """The whole file.
+
+    scene : file of the scene, relative to this one
+    parameters : by name, the values that they take: a list, a range, a distribution
+    outputs : by name, what a run is reduced to: "QUANTITY: HOW", or "= formula" of outputs and parameters
+    bodies : by name, those that are made anew as parameters change
+    points : lists and ranges as a grid, or side by side as a list
+    samples : points drawn of the distributions
+    sampling : how they are drawn
+    seed : of the random numbers
+    histories : keeps the result file of every run, in `<output>.runs`
+    """
 
     model_config = ConfigDict(extra="forbid")
     scene: str

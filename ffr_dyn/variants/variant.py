@@ -85,8 +85,15 @@ def with_modes(body: Body, keep: Modes, interfaces: Iterable[str] | None = None)
 
     Damping ratios become those of the damping matrix in the new coordinates, without what couples these.
 
+    Raises InputError for a scene, of which `vary` makes one with fewer modes.
+
     >>> rod = fd.with_modes(rod, 4)
     """
+    if not isinstance(body, Body):
+        raise InputError(
+            f"with_modes takes a body of a scene, fd.Body(...), not a {type(body).__name__}: of a whole scene "
+            "fd.vary(scene, modes=4) keeps 4 modes of every body"
+        )
     if not isinstance(keep, (int, np.integer)):
         at = np.asarray(keep, int)
         model, frame = truncated(body.model, at), body.frame and body.frame.combined(np.eye(body.model.n)[:, at])

@@ -24,8 +24,8 @@ class Damping:
 
     alpha, beta : Rayleigh's damping alpha M + beta K [1/s], [s]
     loss_factor : [-], of the viscous damping that loses as much as a loss factor of the material at each mode's frequency
-    bands       : (frequency [Hz], damping ratio), ascending: each ratio is that of the modes up to its frequency, the last
-                  one also of all beyond
+    bands       : (b, 2) pairs of frequency [Hz] and damping ratio, ascending: each ratio is that of the modes up to its
+                  frequency, the last one also of all beyond
     ratios      : damping ratios of the modes by rising frequency, the last one also of all others
 
     Raises BodyError for negative or infinite values and for bands that do not ascend.

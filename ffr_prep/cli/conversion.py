@@ -15,13 +15,19 @@ from ffr_prep.common.command import INPUT_FILE, reserve
 _EXAMPLE = """\b
 Example:
   ffr-prep convert rod.ffr --reference simply-supported:big_eye,small_eye -o rod_pinned.ffr
+  ffr-prep convert rod.ffr --reference "fixed:nearest 0,0,0" -o rod_held.ffr
 """
 
 
 @click.command("convert", epilog=_EXAMPLE)
 @click.argument("body", type=INPUT_FILE)
 @OUTPUT
-@click.option("--reference", required=True, metavar="CONDITIONS", help="As in reduce, on the interfaces of BODY.")
+@click.option(
+    "--reference",
+    required=True,
+    metavar="CONDITIONS",
+    help="As in reduce, on the interfaces of BODY, by name or place.",
+)
 @gone("--without-stiffening", "it is --linear now")
 @click.option("--linear", is_flag=True, help="Leave out the load matrices, where they cannot come along.")
 def convert(body: Path, output: Path, reference: str, linear: bool) -> None:

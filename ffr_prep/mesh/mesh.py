@@ -108,8 +108,8 @@ def read_mesh(
     unit     : of the numbers in the file, "m", "cm", "mm" or "in"; without it the unit that a STEP file declares,
                millimetres for IGES, which is converted to them, and metres for every other file. Another unit than a STEP
                or IGES file declares is refused
-    size     : largest element edge when geometry is meshed, in the unit of the file
-    numbers  : parameters of a .geo script to change, by name
+    size     : largest element edge when geometry is meshed, in the unit of the file [m, cm, mm or in]
+    numbers  : parameters of a .geo script to change, by name, in the unit of the script
     order    : 1 or 2, of the elements when geometry is meshed; second-order elements follow curved surfaces
     glue     : solids of a CAD file that touch share the faces between them, and are one body then
     solids   : of a CAD file, the names of those to keep, or patterns such as "volume_1" or "arm*"; all when not given

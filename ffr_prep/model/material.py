@@ -293,6 +293,23 @@ _FORMS: tuple[tuple[str, set[str], set[str], Callable[[str, Mapping[str, Any]], 
     ("", {"E", "nu", "rho"}, set(), _isotropic),
 )
 _NUMBERS = set().union(*(needed for _, needed, _, _ in _FORMS)) - {"elasticity"}
+KEYS = {
+    "name": "of the material; without it that of the file",
+    "E": "Young's modulus [Pa]",
+    "nu": "Poisson's ratio [1]",
+    "rho": "density [kg/m^3]",
+    **{f"E{i}": f"Young's modulus along axis {i} [Pa]" for i in (1, 2, 3)},
+    **{f"nu{ij}": f"contraction along {ij[1]} under tension along {ij[0]} [1]" for ij in ("12", "13", "23")},
+    **{f"G{ij}": f"shear modulus of axes {ij[0]} and {ij[1]} [Pa]" for ij in ("12", "13", "23")},
+    "elasticity": "stress from strain, components xx, yy, zz, xy, xz, yz, engineering shear strains [Pa]",
+    "axes": "rotation matrix whose columns are the axes of the material in those of the mesh; or two directions [1]",
+}
+
+
+def material_keys() -> dict[str, tuple[set[str], set[str]]]:
+    """What a material file may hold: for each kind of material the keys that it must have and those that it may have."""
+    kinds = ("Anisotropic", "Orthotropic", "Isotropic")
+    return {kind: (form[1], form[2] | {"name"}) for kind, form in zip(kinds, _FORMS, strict=True)}
 
 
 def _of_values(text: str, given: Mapping[str, Any], such: str) -> Solid:
@@ -300,7 +317,8 @@ def _of_values(text: str, given: Mapping[str, Any], such: str) -> Solid:
     _, needed, allowed, made = next(form for form in _FORMS if form[0] in given or not form[0])
     unknown, missing = given.keys() - needed - allowed - {"name"}, needed - given.keys()
     if unknown or missing:
-        wrong = [*(f"unknown {key!r}" for key in sorted(unknown)), *(f"{key!r} missing" for key in sorted(missing))]
+        lacking = (f"{key!r} missing ({KEYS[key]})" for key in sorted(missing))
+        wrong = [*(f"unknown {key!r}" for key in sorted(unknown)), *lacking]
         raise InputError(f"material {text!r}: {', '.join(wrong)}{such}")
     return made(str(given.get("name", text)), given)
 

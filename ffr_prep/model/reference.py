@@ -10,8 +10,8 @@ A. A. Shabana, Computers & Structures 21 (1985) 1303-1312 (mean axis).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -19,6 +19,8 @@ import scipy.linalg
 
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
+from ffr_prep.mesh.geometry.node_regions import nodes_of_region
+from ffr_prep.mesh.geometry.region_words import is_query
 from ffr_prep.model.coupled import CoupledModel, in_words, interface_index
 
 Vector = tuple[float, float, float]
@@ -64,6 +66,36 @@ def named_interfaces(conditions: ReferenceConditions) -> tuple[str, ...]:
         case Supports(supports=supports):
             return tuple(support.interface for support in supports)
     return ()
+
+
+def renamed(conditions: ReferenceConditions, meant: Mapping[str, str]) -> ReferenceConditions:
+    """The conditions on the interfaces that are meant by the names in them."""
+    match conditions:
+        case FixedTo(interface=name):
+            return FixedTo(meant[name])
+        case SimplySupported(pin=pin, roller=roller):
+            return SimplySupported(meant[pin], meant[roller])
+        case Supports(supports=supports):
+            return Supports(tuple(replace(one, interface=meant[one.interface]) for one in supports))
+    return conditions
+
+
+def at_interfaces(conditions: ReferenceConditions, names: Sequence[str], positions: Array) -> ReferenceConditions:
+    """The conditions, where these may say a place, such as "nearest 0,0,0" or "plane x=0" [m], for the interface there.
+
+    names, positions : of the interfaces, (m, 3) [m]
+
+    Raises InputError for a place where no interface is, or more than one.
+    """
+    meant = {name: name for name in named_interfaces(conditions)}
+    for name in meant.keys() - set(names):
+        if is_query(name):
+            found = nodes_of_region(positions, {}, name, "there is no interface")
+            if len(found) > 1:
+                both = " and ".join(repr(names[k]) for k in found)
+                raise InputError(f"reference conditions: at {name!r} lie {both}: name the one that is meant")
+            meant[name] = names[found[0]]
+    return renamed(conditions, meant)
 
 
 # ---- the choices --------------------------------------------------------------------------------------------------

@@ -19,7 +19,7 @@ from ffr_prep.model.coupled import CoupledModel
 from ffr_prep.model.cuts import Cuts
 from ffr_prep.model.model import Model
 from ffr_prep.model.reactions import in_equilibrium, known_loads
-from ffr_prep.model.reference import ReferenceConditions, conditions_of_part, functionals
+from ffr_prep.model.reference import ReferenceConditions, at_interfaces, conditions_of_part, functionals
 from ffr_prep.reduction.basis import Basis, Reduction, check_basis, factorised
 from ffr_prep.reduction.held_body import held_body, needs_held_body
 from ffr_prep.reduction.mesh_error import mesh_error
@@ -38,7 +38,8 @@ class Request:
     """What is wanted of a model.
 
     name       : of the body
-    reference  : how its frame is attached, such as FixedTo("root") or MeanAxis()
+    reference  : how its frame is attached, such as FixedTo("root") or MeanAxis(); an interface may be said by where it is,
+                 such as FixedTo("nearest 0,0,0") [m]
     reduction  : which deformation shapes it keeps, such as CraigBampton(10)
     linear     : leave out the load matrices, and with them the second-order displacement by which a simulation has elastic
                  bodies stiffen, and foreshorten, as they bend; bodies of matrices from outside are linear anyway
@@ -101,6 +102,8 @@ def reduce(
         )
     if request.parts is not None and model.cut is None:
         raise InputError("this model cannot be cut into parts: meshes of solids and frames of beams and plates can")
+    reference = at_interfaces(request.reference, model.coupled.names, model.coupled.positions)
+    request = replace(request, reference=reference)
     try:
         whole = _reduced(model, request, progress, advance)
         whole = replace(whole, parts=tuple(_parts(model, request, progress, advance)))

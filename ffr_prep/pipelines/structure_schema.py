@@ -14,7 +14,10 @@ Vector = tuple[float, float, float]
 
 
 class RectangleEntry(Strict):
-    """Width b along z', height h along y' [m]."""
+    """A solid rectangle.
+
+    b : width along z' [m];  h : height along y' [m]
+    """
 
     shape: Literal["rectangle"]
     b: float
@@ -22,14 +25,20 @@ class RectangleEntry(Strict):
 
 
 class CircleEntry(Strict):
-    """Diameter d [m]."""
+    """A solid circle.
+
+    d : diameter [m]
+    """
 
     shape: Literal["circle"]
     d: float
 
 
 class TubeEntry(Strict):
-    """Outer diameter d and wall t [m]."""
+    """A round tube.
+
+    d : outer diameter [m];  t : thickness of the wall [m]
+    """
 
     shape: Literal["tube"]
     d: float
@@ -37,7 +46,11 @@ class TubeEntry(Strict):
 
 
 class IEntry(Strict):
-    """Height h, width b, web and flange thickness [m]."""
+    """An I with equal flanges, its web along y'.
+
+    h : height over all [m];  b : width of the flanges [m]
+    web, flange : thickness [m]
+    """
 
     shape: Literal["i"]
     h: float
@@ -47,7 +60,12 @@ class IEntry(Strict):
 
 
 class GeneralEntry(Strict):
-    """A section by its constants, as in `ffr_prep.structures.sections.general`."""
+    """A section by its constants, as in `ffr_prep.structures.sections.general`.
+
+    A : area [m^2];  J : torsional constant [m^4]
+    Iy, Iz : second moments of area about y' and z' [m^4]
+    ky, kz : shear coefficients for forces along y' and z' [1]; without them the section is rigid in shear
+    """
 
     shape: Literal["general"]
     A: float
@@ -62,7 +80,10 @@ SectionEntry = Annotated[RectangleEntry | CircleEntry | TubeEntry | IEntry | Gen
 
 
 class MaterialEntry(Strict):
-    """Young's modulus [Pa], Poisson's ratio, density [kg/m^3]."""
+    """An isotropic material, to be named by members, shells and solids beside those of the library.
+
+    E : Young's modulus [Pa];  nu : Poisson's ratio [1];  rho : density [kg/m^3]
+    """
 
     E: float
     nu: float
@@ -70,7 +91,14 @@ class MaterialEntry(Strict):
 
 
 class MemberEntry(Strict):
-    """A beam; orientation lies in its x'y' plane, offset is (y, z) of the centroid [m]; shear = false: Euler-Bernoulli."""
+    """What beams are made of.
+
+    section : shape and size
+    material : a name of [materials] or of the library
+    orientation : a vector in the plane of x' (along the beam) and y' (its height) [1]; round sections need none
+    offset : (y', z') of the centroid from the nodes [m]
+    shear : whether shear deforms the beam (Timoshenko); false: Euler-Bernoulli
+    """
 
     section: SectionEntry
     material: str
@@ -80,7 +108,12 @@ class MemberEntry(Strict):
 
 
 class ShellEntry(Strict):
-    """A plate of a thickness [m]; rotary_inertia = false leaves out that of the thickness."""
+    """What plates are made of.
+
+    thickness : of the plate [m]
+    material : a name of [materials] or of the library
+    rotary_inertia : false leaves out that of the thickness
+    """
 
     thickness: float
     material: str
@@ -88,7 +121,13 @@ class ShellEntry(Strict):
 
 
 class GeometryEntry(Strict):
-    """A file as in `ffr_prep.structures.frame_geometry.read_frame`; size and numbers change how a geometry is meshed."""
+    """Curves and surfaces of a file, as in `ffr_prep.structures.frame_geometry.read_frame`; groups name members and shells.
+
+    file : a geometry or a mesh, relative to this file
+    unit : of its lengths; without it that of the file, or metres
+    size : of elements, in the unit of the geometry
+    numbers : values of the constants that a .geo declares by DefineConstant
+    """
 
     file: Path
     unit: Literal["m", "cm", "mm", "in"] | None = None
@@ -97,7 +136,12 @@ class GeometryEntry(Strict):
 
 
 class PolylineEntry(Strict):
-    """Beams from corner to corner [m], each of several elements."""
+    """Beams from corner to corner.
+
+    member : a name of [members]
+    corners : two points or more [m]
+    elements : from corner to corner
+    """
 
     member: str
     corners: list[Vector]
@@ -105,7 +149,13 @@ class PolylineEntry(Strict):
 
 
 class PanelEntry(Strict):
-    """A plate between four corners [m] of n x m elements, or of twice as many triangles."""
+    """A plate between four corners.
+
+    shell : a name of [shells]
+    corners : four points in turn [m]
+    elements : along the first and the second side
+    triangles : twice as many triangles in place of quadrilaterals
+    """
 
     shell: str
     corners: list[Vector]
@@ -114,7 +164,12 @@ class PanelEntry(Strict):
 
 
 class InterfaceEntry(Strict):
-    """At the nodes of a group, by default the one of the same name; point [m]: where its node is."""
+    """Where joints and forces take hold.
+
+    region : a group of nodes or faces, or a search for them; without it the group of the interface's name
+    kind : rigid, or the mean motion of the region
+    point : where its node is [m]; without it the centre of the region
+    """
 
     region: str | None = None
     kind: Literal["rigid", "mean"] = "rigid"
@@ -122,7 +177,12 @@ class InterfaceEntry(Strict):
 
 
 class SupportEntry(Strict):
-    """One prevented motion of an interface."""
+    """One prevented motion of an interface.
+
+    interface : its name
+    motion : translation or rotation
+    direction : along or about which [1]
+    """
 
     interface: str
     motion: Literal["translation", "rotation"]
@@ -130,14 +190,20 @@ class SupportEntry(Strict):
 
 
 class FixedEntry(Strict):
-    """The frame moves with an interface."""
+    """The frame moves with an interface.
+
+    interface : its name
+    """
 
     kind: Literal["fixed"]
     interface: str
 
 
 class SimplySupportedEntry(Strict):
-    """The x' axis of the elastic field passes through two interfaces."""
+    """The x' axis of the elastic field passes through two interfaces.
+
+    pin : where the frame's origin stays;  roller : which stays on the axis
+    """
 
     kind: Literal["simply-supported"]
     pin: str
@@ -151,7 +217,10 @@ class MeanAxisEntry(Strict):
 
 
 class SupportsEntry(Strict):
-    """Any choice of prevented motions."""
+    """Any choice of prevented motions.
+
+    supports : as many as hold the body, six in space
+    """
 
     kind: Literal["supports"]
     supports: list[SupportEntry]
@@ -163,9 +232,12 @@ ReferenceEntry = Annotated[
 
 
 class ReductionEntry(Strict):
-    """A reduction, of a method in `ffr_prep.reduction.registry` or a file of one's own vectors, with a number of normal
-    modes, 10 when nothing is said, or all up to a frequency [Hz], or as many as a relative accuracy of the receptances in
-    a band [low, high, error] needs. `structure_schema` adds the settings of the methods.
+    """A reduction: how many modes is said by one of `modes`, `frequency` and `accuracy`; 10 modes when nothing is said.
+
+    method : a word of `ffr-prep reduce --help`, or the name of a file of one's own vectors
+    modes : normal modes that are kept [1]
+    frequency : all up to this [Hz]
+    accuracy : as many as a relative error of the receptances in a band needs: low [Hz], high [Hz], error [1]
     """
 
     method: str = next(iter(REDUCTIONS)).name
@@ -187,8 +259,16 @@ class ReductionEntry(Strict):
 
 
 class SolidEntry(Strict):
-    """A solid that is tied to the frame: a mesh or geometry as in `ffr_prep.mesh.mesh.read_mesh`, of one material or of one
-    for each volume, with interfaces of its own. glue: solids of a CAD file that touch share the faces between them.
+    """A solid that is tied to the frame.
+
+    file : a mesh or a geometry as in `ffr_prep.mesh.mesh.read_mesh`, relative to this file
+    material : one, or one for each volume, by the names of volumes
+    interfaces : its own, by name
+    unit : of the lengths in the file; without it that of the file, or metres
+    size : of elements, in the unit of the geometry
+    numbers : values of the constants that a .geo declares by DefineConstant
+    order : of the elements
+    glue : solids of a CAD file that touch share the faces between them
     """
 
     file: Path
@@ -202,14 +282,24 @@ class SolidEntry(Strict):
 
 
 class CutEntry(Strict):
-    """A plane that cuts the body into parts, through a point [m]; the next part lies where the normal points."""
+    """A plane that cuts the body into parts.
+
+    point : in the plane [m]
+    normal : points to the next part [1]
+    """
 
     point: Vector
     normal: Vector
 
 
 class DampingEntry(Strict):
-    """Damping of the body: Rayleigh's alpha [1/s] and beta [s], a loss factor, ratios by frequency [Hz] and by mode."""
+    """Damping of the body; all that is given adds up.
+
+    rayleigh : alpha [1/s] and beta [s] of alpha M + beta K
+    loss_factor : viscous damping that loses as much at the frequency of each mode [1]
+    bands : up to which frequency [Hz] which ratio [1] holds
+    ratios : of the modes by rising frequency, the last of all others [1]
+    """
 
     rayleigh: tuple[float, float] = (0.0, 0.0)
     loss_factor: float = 0.0
@@ -218,7 +308,28 @@ class DampingEntry(Strict):
 
 
 class StructureEntry(Strict):
-    """The whole file."""
+    """The whole file.
+
+    name : of the body; without it that of the file
+    geometry : a file of curves and surfaces
+    polylines : beams from corner to corner
+    panels : plates between four corners
+    materials : by name, beside those of the library
+    members : by name, what beams are made of
+    shells : by name, what plates are made of
+    nodes : names of places [m], which interfaces may name
+    interfaces : by name, where joints and forces take hold
+    solids : by name, tied to the frame
+    ties : pairs of interfaces "part.interface" that are joined; the frame is the part "frame"
+    reference : the reference conditions
+    reduction : one table, or several, whose vectors are taken together
+    linear : leaves out the load matrices, so that the body does not stiffen with its loads
+    drawn_modes : how many of the lowest foreshorten pictures; without it all
+    stress : keeps what stress is computed of
+    quality : compares with the full model between these frequencies [Hz]
+    damping : of the body
+    parts : a number of parts along its long axis, or where it is cut: places along the axis [m] or planes
+    """
 
     name: str | None = None
     geometry: GeometryEntry | None = None
@@ -264,10 +375,10 @@ class StructureEntry(Strict):
 
 
 def structure_schema() -> type[StructureEntry]:
-    """The schema of the whole file, with the settings of all registered reductions."""
+    """The schema of the whole file, with the settings of all registered reductions as keys of theirs."""
     settings: dict[str, Any] = {
         s.name: (s.type, Field(default=s.default, ge=s.least, description=s.help)) for s in REDUCTIONS.settings()
     }
-    entry = create_model("ReductionEntry", __base__=ReductionEntry, **settings)
+    entry = create_model("ReductionEntry", __base__=ReductionEntry, __doc__=ReductionEntry.__doc__, **settings)
     several = (list[entry], Field(default=[entry()], min_length=1))  # type: ignore[valid-type]
-    return create_model("StructureEntry", __base__=StructureEntry, reduction=several)
+    return create_model("StructureEntry", __base__=StructureEntry, __doc__=StructureEntry.__doc__, reduction=several)

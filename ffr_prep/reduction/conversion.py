@@ -32,13 +32,20 @@ from ffr_prep.body.interface_freedom import interface_freedom
 from ffr_prep.body.provenance import described
 from ffr_prep.common.errors import InputError
 from ffr_prep.model.coupled import CoupledModel
-from ffr_prep.model.reference import ReferenceConditions, UserConditions, conditions_of_part, functionals
+from ffr_prep.model.reference import (
+    ReferenceConditions,
+    UserConditions,
+    at_interfaces,
+    conditions_of_part,
+    functionals,
+)
 from ffr_prep.reduction.basis import diagonalised, in_frame
 from ffr_prep.reduction.turned_stiffening import turned_stiffening
 
 
 def with_reference(body: FlexibleBody, conditions: ReferenceConditions) -> FlexibleBody:
-    """The body in the frame of other reference conditions: fixed to or supported at interfaces, or mean axis.
+    """The body in the frame of other reference conditions: fixed to or supported at interfaces, or mean axis. An interface
+    may be said by where it is, such as "nearest 0,0,0" [m].
 
     Modes are those under the new conditions, diagonal again; with more than six conditions there are fewer. What the old
     body could not represent, the new one cannot either; its provenance says so in "warnings".
@@ -52,6 +59,7 @@ def with_reference(body: FlexibleBody, conditions: ReferenceConditions) -> Flexi
     if isinstance(conditions, UserConditions):
         raise InputError("conditions on the nodes of the mesh need the mesh: reduce it again, or use interfaces")
     model = motion_model(body)
+    conditions = at_interfaces(conditions, model.names, model.positions)
     L = functionals(conditions, model)
     elastic = in_frame(model, L, np.eye(6 + body.n)[:, 6:])
     basis = diagonalised(model, elastic, elastic.T @ (model.K @ elastic))

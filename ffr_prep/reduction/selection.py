@@ -52,7 +52,7 @@ class UpTo:
 
 @dataclass(frozen=True)
 class Accuracy:
-    """As few modes as keep the error of the interface receptances below a tolerance, over a band of frequencies.
+    """As few modes as keep the error of the interface receptances below a tolerance [1], over a band of frequencies [Hz].
 
     The error is that of `ffr_prep.reduction.receptance.receptance_error`: relative to the size that each receptance has
     away from antiresonances. It is measured against a richer basis of the same model (all free modes up to twice the band and

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -13,7 +12,7 @@ from ffr_prep.mesh.geometry.region_words import is_query
 from ffr_prep.mesh.geometry.skin import with_regions
 from ffr_prep.mesh.mesh import Mesh, region_nodes
 from ffr_prep.model.coupled import InterfaceRegion
-from ffr_prep.model.reference import FixedTo, ReferenceConditions, SimplySupported, Supports, named_interfaces
+from ffr_prep.model.reference import ReferenceConditions, named_interfaces, renamed
 from ffr_prep.solids.model import with_interfaces
 
 _NAME = "support"
@@ -36,14 +35,7 @@ def at_regions(
             found = _lying_at(mesh, every, name) or InterfaceRegion(_free_name(every), name, "mean")
             every += [] if found in every else [found]
             meant[name] = found.name
-    match reference:
-        case FixedTo(interface=name):
-            return every, FixedTo(meant[name])
-        case SimplySupported(pin=pin, roller=roller):
-            return every, SimplySupported(meant[pin], meant[roller])
-        case Supports(supports=supports):
-            return every, Supports(tuple(replace(one, interface=meant[one.interface]) for one in supports))
-    return every, reference
+    return every, renamed(reference, meant)
 
 
 def _lying_at(mesh: Mesh, interfaces: Sequence[InterfaceRegion], region: str) -> InterfaceRegion | None:

@@ -153,5 +153,5 @@ def _quadratic(parts: tuple[Family, ...], count: int, k: int, l: int) -> sp.csr_
     for part in parts:
         B_1 = connectivity(part.nodes, count)
         blocks = np.einsum("epa,ep,epb->eab", part.field[:, :, k], part.mass, part.field[:, :, l], optimize=True)
-        total = total + B_1.T @ sp.csr_array(sp.block_diag(list(blocks))) @ B_1
+        total = total + B_1.T @ sp.csr_array(sp.block_diag([sp.coo_array(block) for block in blocks])) @ B_1
     return sp.csr_array(total)

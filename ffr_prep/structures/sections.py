@@ -145,6 +145,8 @@ def general(
 ) -> Section:
     """A section by its constants (see Section); without shear factors it is rigid in shear.
 
+    A : area [m^2];  Iy, Iz : second moments [m^4];  J : torsion constant [m^4];  ky, kz : shear factors [1]
+
     >>> section = fp.general("rail", A=7.7e-3, Iy=3.0e-5, Iz=5.1e-6, J=2.2e-6)
     """
     return Section(name, A, Iy, Iz, J, ky, kz)
@@ -171,6 +173,8 @@ def shifted(section: Section, y: float, z: float) -> Section:
 
 def with_mass_moments(section: Section, Iy: float, Iz: float) -> Section:
     """The section with other second moments of the mass; (x, 0) with a small x leaves bending without rotary inertia.
+
+    Iy, Iz : integrals of z^2 and of y^2 over what carries mass, in the measure of the area [m^4]
 
     >>> section = fp.with_mass_moments(fp.circle(0.02), 1e-8, 1e-8)
     """

@@ -1,8 +1,9 @@
-"""Public names explain themselves: what they are, which errors they raise, and an example that can be called."""
+"""Public names explain themselves: what they are, shapes, units, errors, and an example that can be called."""
 
 from __future__ import annotations
 
 import ast
+import dataclasses
 import inspect
 import re
 import textwrap
@@ -67,6 +68,35 @@ def test_errors_that_it_raises_itself_are_named(name):
     assert {
         word for word in raised & {"InputError", "ComputationError", "BodyError"} if word not in thing.__doc__
     } == set()
+
+
+SHAPE, UNIT = re.compile(r"\((?:[\w +*.]+,)+[\w +*.]*\)"), re.compile(r"\[[^\]]+\]")
+ELSEWHERE = re.compile(r"\b(?:as of|as in|those of) `")  # which says them
+OF_ARRAYS, OF_NUMBERS = re.compile(r"\b(?:Array|Vector)\b|tuple\[float"), re.compile(r"\bfloat\b")
+
+
+def told(thing: Any) -> str:
+    """Docstring, and the help of options."""
+    made = dataclasses.fields(thing) if dataclasses.is_dataclass(thing) else ()
+    return " ".join([thing.__doc__ or "", *(str(dict(field.metadata)) for field in made)])
+
+
+def annotations(thing: Any) -> str:
+    """Of what it takes and, of a function, returns."""
+    try:
+        found = inspect.signature(thing)
+    except (TypeError, ValueError):
+        return ""
+    taken = [str(of.annotation) for of in found.parameters.values() if not of.name.startswith("_")]
+    return " ; ".join([*taken, *([] if inspect.isclass(thing) else [str(found.return_annotation)])])
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_shapes_of_arrays_and_units_of_numbers_are_told(name):
+    thing = found(name)
+    text, given = told(thing), annotations(thing)
+    assert not OF_ARRAYS.search(given) or SHAPE.search(text), "a shape such as (N, 3) is missing"
+    assert not OF_NUMBERS.search(given) or UNIT.search(text) or ELSEWHERE.search(text), "a unit such as [m] is missing"
 
 
 # ---- lists in docstrings --------------------------------------------------------------------------------------------

@@ -15,6 +15,7 @@ import pytest
 from places import ROOT
 
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+RECIPE = ROOT / "recipe" / "recipe.yaml"
 OTHER_NAMES = {"gmsh": "python-gmsh", "matplotlib": "matplotlib-base"}  # of conda-forge
 SCENE = """
 gravity = [0, -9.81, 0]
@@ -44,6 +45,14 @@ EI = 2.1e11 * 3.14159265 * 0.01**4 / 4
 assert abs(body.omega2[0] ** 0.5 / (1.87510407**2 * (EI / body.mass) ** 0.5) - 1) < 0.05
 print(fp.__file__)
 """
+TABLE = """
+import ffr_dyn as fd
+result = fd.load_result("swing.nc")
+try:
+    print(len(result.to_pandas()), result.to_xarray().sizes["time"])
+except fd.InputError as error:
+    print(error)
+"""
 
 
 def bounds(dependencies: list[str]) -> dict[str, str]:
@@ -54,16 +63,14 @@ def bounds(dependencies: list[str]) -> dict[str, str]:
 def test_the_version_is_the_same_everywhere():
     version = PROJECT["version"]
     assert f"\nversion: {version}\n" in (ROOT / "CITATION.cff").read_text(encoding="utf-8")
-    assert f'set version = "{version}"' in (ROOT / "recipe" / "meta.yaml").read_text(encoding="utf-8")
+    assert f'\n  version: "{version}"\n' in RECIPE.read_text(encoding="utf-8")
     assert f"## {version} " in (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
 
 
 def test_the_recipe_and_the_oldest_versions_are_those_of_the_project():
     wanted = bounds(PROJECT["dependencies"])
-    recipe = (
-        (ROOT / "recipe" / "meta.yaml").read_text(encoding="utf-8").partition("  run:\n")[2].partition("\ntest:")[0]
-    )
-    run = bounds(re.findall(r"^    - (.*)$", recipe, re.M))
+    needed = RECIPE.read_text(encoding="utf-8").partition("  run:\n")[2].partition("\ntests:")[0]
+    run = bounds(re.findall(r"^    - (.*)$", needed, re.M))
     assert run.pop("python") == PROJECT["requires-python"]
     assert run == {OTHER_NAMES.get(name, name): bound for name, bound in wanted.items()}
     lines = (ROOT / "constraints-oldest.txt").read_text(encoding="utf-8").splitlines()
@@ -117,19 +124,35 @@ def test_the_distributions_hold_what_they_should(made):
     assert [name for name in inside if name.startswith(("docs/made", "docs/gallery", "build/"))] == []
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("extras", ["", "[tables]"])
-def test_the_wheel_works_in_a_bare_environment(made, tmp_path, extras):
+@pytest.fixture(scope="module")
+def bare(made, tmp_path_factory):
+    """Folder of the programs of an environment with the wheel and what it needs."""
     (wheel,) = made.glob("*.whl")
-    run(sys.executable, "-m", "venv", tmp_path / "bare", cwd=tmp_path)
-    programs = tmp_path / "bare" / "bin"
-    run(programs / "python", "-m", "pip", "install", "--quiet", f"{wheel}{extras}", cwd=tmp_path)
+    folder = tmp_path_factory.mktemp("bare")
+    run(sys.executable, "-m", "venv", folder, cwd=folder)
+    run(folder / "bin" / "python", "-m", "pip", "install", "--quiet", wheel, cwd=folder)
+    return folder / "bin"
+
+
+@pytest.mark.slow
+def test_the_wheel_works_in_a_bare_environment(bare, tmp_path):
     (tmp_path / "swing.toml").write_text(SCENE, encoding="utf-8")
     for command in ("ffr-prep", "ffr-dyn"):
-        assert PROJECT["version"] in run(programs / command, "--version", cwd=tmp_path)
-    run(programs / "ffr-dyn", "run", "swing.toml", "-o", "swing.nc", cwd=tmp_path)
-    assert "hinge.force" in run(programs / "ffr-dyn", "info", "swing.nc", cwd=tmp_path)
-    run(programs / "ffr-dyn", "plot", "swing.nc", "hinge.force", "-o", "force.png", cwd=tmp_path)
-    run(programs / "ffr-dyn", "animate", "swing.nc", "-o", "film.html", cwd=tmp_path)
-    found = run(programs / "python", "-c", PROGRAM, cwd=tmp_path).strip()
-    assert found.startswith(str(tmp_path))
+        assert PROJECT["version"] in run(bare / command, "--version", cwd=tmp_path)
+    run(bare / "ffr-dyn", "run", "swing.toml", "-o", "swing.nc", cwd=tmp_path)
+    assert "hinge.force" in run(bare / "ffr-dyn", "info", "swing.nc", cwd=tmp_path)
+    run(bare / "ffr-dyn", "plot", "swing.nc", "hinge.force", "-o", "force.png", cwd=tmp_path)
+    run(bare / "ffr-dyn", "animate", "swing.nc", "-o", "film.html", cwd=tmp_path)
+    found = run(bare / "python", "-c", PROGRAM, cwd=tmp_path).strip()
+    assert found.startswith(str(bare.parent))
+
+
+@pytest.mark.slow
+def test_extras_come_with_the_wheel(made, bare, tmp_path):
+    """Without them a result says what it lacks; with them it is a table."""
+    (wheel,) = made.glob("*.whl")
+    (tmp_path / "swing.toml").write_text(SCENE, encoding="utf-8")
+    run(bare / "ffr-dyn", "run", "swing.toml", "-o", "swing.nc", cwd=tmp_path)
+    assert "pip install pandas" in run(bare / "python", "-c", TABLE, cwd=tmp_path)
+    run(bare / "python", "-m", "pip", "install", "--quiet", f"{wheel}[tables]", cwd=tmp_path)
+    assert run(bare / "python", "-c", TABLE, cwd=tmp_path).split() == ["11", "11"]

@@ -1,4 +1,4 @@
-"""The reference of the site: every key of a scene file has its meaning, a place on the page, and an example."""
+"""The reference of the site: every key of a file that people write has its meaning, a place on a page, and an example."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ import re
 import sys
 import tomllib
 from importlib import import_module
-from types import SimpleNamespace
 from typing import Any
 
 import click
@@ -19,33 +18,27 @@ import ffr_dyn
 import ffr_prep
 from ffr_dyn.cli import cli as dyn_cli
 from ffr_dyn.scene_file.schema import scene_entry
+from ffr_dyn.studies.plan import StudyFile
 from ffr_prep.cli import cli as prep_cli
+from ffr_prep.model.material import parse_material
+from ffr_prep.pipelines.structure_schema import structure_schema
 
-SCHEMA: dict[str, Any] = json.loads((ROOT / "docs" / "scene.schema.json").read_text(encoding="utf-8"))
-ENTRIES = {"Scene": SCHEMA, **SCHEMA["$defs"]}
-EXAMPLES = tomllib.loads((ROOT / "docs" / "reference" / "examples.toml").read_text(encoding="utf-8"))
+sys.path.insert(0, str(ROOT / "docs" / "extensions"))
+try:
+    commands, doors, entries = map(import_module, ("commands", "doors", "entries"))
+finally:
+    sys.path.pop(0)
+
+KINDS = {kind.word: kind for kind in entries.kinds()}
+ALL = [(word, name) for word, kind in KINDS.items() for name in kind.entries]
+PAGES = {word: entries.page(kind) for word, kind in KINDS.items()}
 ONE_SCENE = {"bodies": {}, "analysis": {"end": 1, "output_step": 0.1}}
 INSIDE_FORWARD = {"EventEntry", "StabilisationEntry", "TolerancesEntry"}
 INSIDE_MIXED = {"JointEffortEntry", "MarkerEffortEntry", "CausalEntry", "BoundedEntry"}
 
 
-@pytest.fixture(scope="module")
-def makers():
-    """What makes the pages of the site."""
-    sys.path.insert(0, str(ROOT / "docs" / "extensions"))
-    try:
-        return SimpleNamespace(**{name: import_module(name) for name in ("commands", "doors", "entries")})
-    finally:
-        sys.path.pop(0)
-
-
-@pytest.fixture(scope="module")
-def page(makers):
-    return makers.entries.page(SCHEMA)
-
-
-def snippets(name: str) -> list[dict[str, Any]]:
-    return [tomllib.loads(text) for text in EXAMPLES[name].split("# ------ or")]
+def snippets(word: str, name: str) -> list[dict[str, Any]]:
+    return [tomllib.loads(text) for text in KINDS[word].examples[name].split("# ------ or")]
 
 
 def whole(name: str, part: dict[str, Any]) -> dict[str, Any]:
@@ -65,46 +58,83 @@ def keys_given(of: Any, keys: set[str]) -> set[str]:
     return set().union(*(keys_given(value, keys) for value in of)) if isinstance(of, list) else set()
 
 
-@pytest.mark.parametrize("name", ENTRIES)
-def test_every_key_says_what_it_means(name):
-    assert [key for key, of in ENTRIES[name]["properties"].items() if len(of.get("description", "")) < 4] == []
-    assert ENTRIES[name].get("description")
+@pytest.mark.parametrize(("word", "name"), ALL)
+def test_every_key_says_what_it_means(word, name):
+    entry = KINDS[word].entries[name]
+    assert [key for key, of in entry["properties"].items() if len(of.get("description", "")) < 4] == []
+    assert entry.get("description")
 
 
-@pytest.mark.parametrize("name", ENTRIES)
-def test_every_key_is_on_the_page(page, name):
-    section = re.split(r"\n\(\w+\)=\n", page.partition(f"({name})=\n")[2])[0]
-    assert [key for key in ENTRIES[name]["properties"] if f"| `{key}` |" not in section] == []
+@pytest.mark.parametrize(("word", "name"), ALL)
+def test_every_key_is_on_the_page(word, name):
+    section = re.split(r"\n\(\w+\)=\n", PAGES[word].partition(f"({name})=\n")[2])[0]
+    assert [key for key in KINDS[word].entries[name]["properties"] if f"| `{key}` |" not in section] == []
     assert "```toml" in section
 
 
-@pytest.mark.parametrize("name", ENTRIES)
-def test_the_examples_of_an_entry_have_all_of_its_keys_and_are_valid(name, tmp_path, monkeypatch):
-    keys = set(ENTRIES[name]["properties"])
-    given = list(snippets(name))
-    assert keys - set().union(*(keys_given(part, keys) for part in given)) <= {"kind"}
+@pytest.mark.parametrize(("word", "name"), ALL)
+def test_the_examples_of_an_entry_have_all_of_its_keys(word, name):
+    keys = set(KINDS[word].entries[name]["properties"])
+    assert keys - set().union(*(keys_given(part, keys) for part in snippets(word, name))) <= {"kind"}
+
+
+@pytest.mark.parametrize("name", KINDS["scene"].entries)
+def test_examples_of_scenes_are_valid(name, tmp_path, monkeypatch):
     (tmp_path / "angle.csv").write_text("0, 0\n1, 0.1\n2, 0\n", encoding="utf-8")
     monkeypatch.chdir(tmp_path)
     adapter = TypeAdapter(scene_entry())
-    for part in given:
+    for part in snippets("scene", name):
         adapter.validate_python(whole(name, part), context={"parameters": {"length": 0.3}})
 
 
-def test_no_example_is_of_nothing():
-    assert set(EXAMPLES) == set(ENTRIES)
+@pytest.mark.parametrize("name", KINDS["structure"].entries)
+def test_examples_of_structures_are_valid(name):
+    for part in snippets("structure", name):
+        structure_schema().model_validate(
+            {"geometry": {"file": "portal.geo"}, "ties": [["a", "b"]] * ("solids" in part), **part}
+        )
 
 
-def test_links_of_the_page_lead_to_its_sections(page):
-    anchors = set(re.findall(r"^\((\w+)\)=$", page, re.M))
-    assert set(re.findall(r"\]\(#(\w+)\)", page)) <= anchors
+@pytest.mark.parametrize("name", KINDS["material"].entries)
+def test_examples_of_materials_are_valid(name, tmp_path):
+    (tmp_path / "own.toml").write_text(KINDS["material"].examples[name], encoding="utf-8")
+    assert parse_material(str(tmp_path / "own.toml")).rho > 0
+
+
+@pytest.mark.parametrize("name", KINDS["study"].entries)
+def test_examples_of_studies_are_valid(name):
+    for part in snippets("study", name):
+        StudyFile.model_validate({"scene": "a.toml", "parameters": {}, "outputs": {}, **part})
+
+
+def test_numbers_of_structures_and_materials_have_units():
+    """Beside their meaning, [1] where they have none; but for counts and places that a vector says."""
+    plain = {"numbers", "size", "interface_modes", "moments"}
+    for word in ("structure", "material"):
+        for entry in KINDS[word].entries.values():
+            for key, of in entry["properties"].items():
+                if '"number"' in json.dumps(of) and '"integer"' not in json.dumps(of) and key not in plain:
+                    assert "[" in of["description"] or "$ref" in json.dumps(of), key
+
+
+@pytest.mark.parametrize("word", KINDS)
+def test_no_example_is_of_nothing(word):
+    assert set(KINDS[word].examples) == set(KINDS[word].entries)
+
+
+def test_links_of_the_pages_lead_to_their_sections():
+    anchors = [anchor for page in PAGES.values() for anchor in re.findall(r"^\((\w+)\)=$", page, re.M)]
+    assert len(anchors) == len(set(anchors))
+    for page in PAGES.values():
+        assert set(re.findall(r"\]\(#(\w+)\)", page)) <= set(re.findall(r"^\((\w+)\)=$", page, re.M))
 
 
 # ---- commands and public names --------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(("name", "group"), [("ffr-prep", prep_cli), ("ffr-dyn", dyn_cli)])
-def test_every_command_and_option_is_on_the_page(makers, name, group):
-    page = makers.commands.page(name, group)
+def test_every_command_and_option_is_on_the_page(name, group):
+    page = commands.page(name, group)
     context = click.Context(group, info_name=name)
     for word in group.list_commands(context):
         command = group.get_command(context, word)
@@ -114,13 +144,13 @@ def test_every_command_and_option_is_on_the_page(makers, name, group):
 
 
 @pytest.mark.parametrize(("package", "alias"), [(ffr_prep, "fp"), (ffr_dyn, "fd")])
-def test_every_public_name_is_on_the_page(makers, package, alias):
-    page = makers.doors.page(package, alias)
+def test_every_public_name_is_on_the_page(package, alias):
+    page = doors.page(package, alias)
     named = set(re.findall(rf"^`{{4}}{{py:\w+}} {package.__name__}\.(\w+)", page, re.M))
     assert named == set(package.__all__) - {"__version__"}
 
 
-def test_signatures_are_short_and_types_left_out(makers):
-    text = makers.doors._signature(ffr_dyn.forward)
+def test_signatures_are_short_and_types_left_out():
+    text = doors._signature(ffr_dyn.forward)
     assert text.startswith("(scene, *, end, output_step, method=None, start=0.0, stabilisation=...")
     assert "Integrator" not in text

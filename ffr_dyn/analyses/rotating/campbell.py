@@ -261,5 +261,7 @@ def campbell_lines(result: Result) -> list[str]:
         f"critical     {one['speed']:.6g} rad/s ({one['speed'] * 30 / np.pi:.6g} rpm), order {one['order']:g}: {one['mode']}"
         for one in sorted(a["critical"], key=lambda one: one["speed"])
     ]
+    if not a["critical"]:
+        lines.append(f"critical     none between {speeds[0]:.6g} and {speeds[-1]:.6g} rad/s")
     lines += [f"unstable     from {one['speed']:.6g} rad/s: {one['mode']}" for one in a["limits"]]
     return lines + [f"note         {note}" for note in a["notes"]]

@@ -1,6 +1,6 @@
 // Pictures, one after the other, and what steers them.
 
-let wanted = false;
+let wanted = false, last; // whether a picture is on its way; when the last one of a film was drawn
 const redraw = () => { if (!wanted) { wanted = true; requestAnimationFrame(() => { wanted = false; draw(); }); } };
 
 function draw() {
@@ -14,7 +14,8 @@ function draw() {
   drawOver(at, width, height);
   $("now").style.left = `${across(state.time)}px`;
   $("time").value = state.time;
-  $("clock").textContent = about.moments[Math.round(at.row + at.share * (at.next - at.row))] || `${short(about.clock.factor * state.time)} ${about.clock.unit}`;
+  const moment = about.moments[Math.round(at.row + at.share * (at.next - at.row))];
+  $("clock").textContent = moment || `${short(about.clock.factor * state.time)} ${about.clock.unit}`;
   state.drawn += 1;
 }
 
@@ -29,7 +30,8 @@ function look(direction, up) {
 
 function turn(dx, dy) {
   const [right, up, towards] = camera.axes;
-  const by = (a, b, angle) => [add(a.map((c) => c * Math.cos(angle)), b, Math.sin(angle)), add(b.map((c) => c * Math.cos(angle)), a, -Math.sin(angle))];
+  const mix = (a, b, angle) => add(a.map((c) => c * Math.cos(angle)), b, Math.sin(angle));
+  const by = (a, b, angle) => [mix(a, b, angle), mix(b, a, -angle)];
   const [right2, towards2] = by(right, towards, 0.008 * dx), [up2, towards3] = by(up, towards2, -0.008 * dy);
   camera.axes = [unit(right2), unit(up2), unit(towards3)];
   redraw();
@@ -37,11 +39,9 @@ function turn(dx, dy) {
 
 // ---- controls -----------------------------------------------------------------------------------------------------------
 
-const VIEWS = { start: [about.camera.direction, about.camera.up], x: [[1, 0, 0], [0, 0, 1]], y: [[0, -1, 0], [0, 0, 1]], z: [[0, 0, 1], [0, 1, 0]], corner: [[0.75, -1, 0.6], [0, 0, 1]] };
-function seek(time) {
-  state.time = Math.min(Math.max(time, rows[0]), rows.at(-1));
-  redraw();
-}
+const [UP, { direction, up }] = [[0, 0, 1], about.camera];
+const VIEWS = { start: [direction, up], x: [[1, 0, 0], UP], y: [[0, -1, 0], UP], z: [UP, [0, 1, 0]], corner: [[0.75, -1, 0.6], UP] };
+const seek = (time) => { state.time = Math.min(Math.max(time, rows[0]), rows.at(-1)); redraw(); };
 
 function step(by) {
   play(false);
@@ -49,7 +49,6 @@ function step(by) {
   seek(rows[Math.min(Math.max(row + (by < 0 && at.share > 0 && at.share < 1 ? 0 : by), 0), rows.length - 1)]);
 }
 
-let last;
 function play(on) {
   state.playing = on && span() > 0;
   if (state.playing && state.time >= rows.at(-1)) state.time = rows[0];
@@ -60,16 +59,12 @@ function play(on) {
 
 function tick(now) {
   if (!state.playing) return;
-  if (last !== undefined) {
-    state.time += ((now - last) / 1000) * state.speed * span() / about.seconds;
-    if (state.time > rows.at(-1)) {
-      if (state.loop) state.time = rows[0] + ((state.time - rows[0]) % span());
-      else { state.time = rows.at(-1); play(false); }
-    }
-  }
+  const time = state.time + (last === undefined ? 0 : ((now - last) / 1000) * state.speed * span() / about.seconds);
   last = now;
+  if (time > rows.at(-1) && !state.loop) { state.time = rows.at(-1); return play(false); }
+  state.time = time > rows.at(-1) ? rows[0] + ((time - rows[0]) % span()) : time;
   draw();
-  if (state.playing) requestAnimationFrame(tick);
+  requestAnimationFrame(tick);
 }
 
 function setScale(scale) {
@@ -83,8 +78,7 @@ function setScale(scale) {
 function setColouring(k) {
   const colour = about.colours[k];
   state.colour = k;
-  $("limit").disabled = !colour.map;
-  $("limit").value = colour.map ? short(state.limits[k] * colour.factor) : "";
+  Object.assign($("limit"), { disabled: !colour.map, value: colour.map ? short(state.limits[k] * colour.factor) : "" });
   $("unit").textContent = colour.unit || "";
   redraw();
 }
@@ -92,22 +86,18 @@ function setColouring(k) {
 /** A list of things with a box each, and one for all. */
 function list(title, things, open) {
   if (!things.length) return;
-  const whole = document.createElement("details"), head = document.createElement("summary"), all = document.createElement("input");
+  const [whole, first] = ["list", "item"].map((id) => $(id).content.firstElementChild.cloneNode(true));
+  const [all, words] = whole.firstElementChild.children;
   whole.open = open;
-  all.type = "checkbox";
-  all.checked = things.every((thing) => thing.shown !== false && thing.shown !== undefined);
-  head.append(all, ` ${title} (${things.length})`);
-  whole.append(head);
+  words.textContent = `${title} (${things.length})`;
+  all.checked = things.every((thing) => thing.shown);
   const boxes = things.map((thing) => {
-    const label = document.createElement("label"), box = document.createElement("input"), swatch = document.createElement("i");
-    box.type = "checkbox";
-    box.checked = thing.shown === true;
+    const label = first.cloneNode(true), [box, swatch, name] = label.children;
+    Object.assign(box, { checked: thing.shown, onchange: () => { thing.shown = box.checked; redraw(); } });
     box.dataset.name = thing.name;
-    box.onchange = () => { thing.shown = box.checked; redraw(); };
-    swatch.className = "swatch";
-    swatch.style.background = thing.colour || "transparent";
-    label.append(box, " ", ...(thing.colour ? [swatch] : []), thing.label || thing.name);
-    label.title = thing.label || thing.name;
+    swatch.hidden = !thing.colour;
+    swatch.style.background = thing.colour;
+    label.title = name.textContent = thing.label || thing.name;
     whole.append(label);
     return box;
   });
@@ -117,26 +107,17 @@ function list(title, things, open) {
 }
 
 function lists() {
-  list("Bodies", about.bodies, true);
-  list("Joints", about.joints, about.joints.length < 20);
-  list("Forces, moments", about.arrows, false);
-  list("Markers", about.markers, false);
-  list("Paths", about.traces, true);
-  const whole = document.createElement("details"), select = document.createElement("select");
-  whole.open = true;
-  whole.innerHTML = "<summary>Plots</summary>";
-  select.id = "series";
-  select.multiple = true;
-  about.series.forEach((one, k) => select.add(new Option(`${one.name} [${one.unit}]`, k, false, one.chosen)));
-  select.onchange = () => { drawPlots(); redraw(); };
-  whole.append(select);
-  whole.hidden = !about.series.length || rows.length < 2;
-  $("lists").append(whole);
+  const { bodies, joints, arrows, markers, traces } = about, small = joints.length < 20;
+  for (const [title, things, open] of [["Bodies", bodies, true], ["Joints", joints, small], ["Forces, moments", arrows, false],
+    ["Markers", markers, false], ["Paths", traces, true]]) list(title, things, open);
+  about.series.forEach((one, k) => $("series").add(new Option(`${one.name} [${one.unit}]`, k, false, one.chosen)));
+  $("series").onchange = () => { drawPlots(); redraw(); };
+  $("plotted").hidden = !about.series.length || rows.length < 2;
+  $("lists").append($("plotted"));
 }
 
 function connect() {
   about.colours.forEach((colour, k) => $("colour").add(new Option(colour.words, k)));
-  for (const speed of [0.05, 0.1, 0.25, 0.5, 1, 2, 4, 8]) $("speed").add(new Option(speed, speed, speed === 1, speed === 1));
   [$("time").min, $("time").max] = [rows[0], rows.at(-1)];
   $("play").onclick = () => play(!state.playing);
   $("back").onclick = () => step(-1);
@@ -147,7 +128,11 @@ function connect() {
   $("scale").onchange = () => setScale(Number($("scale").value));
   $("scaling").oninput = () => { const s = Number($("scaling").value); setScale(s > 0 ? 0.1 * (about.most / 0.1) ** (s / 100) : 0); };
   $("colour").onchange = () => setColouring(Number($("colour").value));
-  $("limit").onchange = () => { const v = Number($("limit").value) / about.colours[state.colour].factor; if (v > 0) state.limits[state.colour] = v; redraw(); };
+  $("limit").onchange = () => {
+    const limit = Number($("limit").value) / about.colours[state.colour].factor;
+    if (limit > 0) state.limits[state.colour] = limit;
+    redraw();
+  };
   for (const id of ["edges", "ghost", "names", "frames"]) { $(id).checked = about.boxes.includes(id); $(id).onchange = redraw; }
   for (const button of $("views").querySelectorAll("button")) button.onclick = () => look(...VIEWS[button.dataset.view]);
   $("plots").onpointerdown = $("plots").onpointermove = (event) => {

@@ -12,7 +12,7 @@ const MOST_SHAPES = 60, MOST_TENSORS = 40; // as in ffr_dyn/pictures/morphs.py
 const INK = "#222222";
 
 const about = JSON.parse($("about").textContent);
-let numbers; // ArrayBuffer of all arrays
+let numbers, rows; // ArrayBuffer of all arrays; times of the rows [s]
 
 async function unpack() {
   const packed = Uint8Array.from(atob($("numbers").textContent), (letter) => letter.charCodeAt(0));
@@ -30,7 +30,6 @@ function array([type, offset, length, scale]) {
 
 const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 const add = (a, b, s = 1) => [a[0] + s * b[0], a[1] + s * b[1], a[2] + s * b[2]];
-const times = (A, v) => [0, 1, 2].map((r) => A[r] * v[0] + A[3 + r] * v[1] + A[6 + r] * v[2]);
 const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
 const unit = (a) => a.map((c) => c / (Math.hypot(...a) || 1));
 
@@ -47,39 +46,25 @@ function rotation(p) {
 // ---- what is shown, and when ------------------------------------------------------------------------------------------
 
 const state = { time: 0, playing: false, loop: true, speed: 1, scale: about.scale, colour: 0, limits: [], drawn: 0 };
-let rows; // times of the rows [s]
 const span = () => rows.at(-1) - rows[0];
 const camera = { axes: [], target: about.centre.slice(), reach: 1 }; // axes: right, up, towards the eye
 
 /** The row before a time, and how far it is on the way to the next (0 to 1). */
 function place(time) {
-  let low = 0, high = rows.length - 1;
-  while (high - low > 1) {
-    const middle = (low + high) >> 1;
-    if (rows[middle] <= time) low = middle; else high = middle;
-  }
-  const step = rows[high] - rows[low];
-  return { row: low, next: high, share: step > 0 ? Math.min(Math.max((time - rows[low]) / step, 0), 1) : 0, step };
+  const row = Math.max(Math.min(rows.findLastIndex((t) => t <= time), rows.length - 2), 0), next = Math.min(row + 1, rows.length - 1);
+  const step = rows[next] - rows[row];
+  return { row, next, share: step > 0 ? Math.min(Math.max((time - rows[row]) / step, 0), 1) : 0, step };
 }
 
-/** A history (rows, count) between two rows. */
-function between(values, count, at) {
-  const a = at.row * count, b = at.next * count;
-  return Array.from({ length: count }, (_, k) => values[a + k] + at.share * (values[b + k] - values[a + k]));
-}
-
-/** Its rate there. */
-function rate(values, count, at) {
-  const a = at.row * count, b = at.next * count;
-  return Array.from({ length: count }, (_, k) => (at.step > 0 ? (values[b + k] - values[a + k]) / at.step : 0));
-}
+/** A history (rows, count) between two rows, and its rate there. */
+const mixed = (values, count, at, mix) => Array.from({ length: count }, (_, k) => mix(values[at.row * count + k], values[at.next * count + k]));
+const between = (values, count, at) => mixed(values, count, at, (a, b) => a + at.share * (b - a));
+const rate = (values, count, at) => mixed(values, count, at, (a, b) => (at.step > 0 ? (b - a) / at.step : 0));
 
 /** Place and axes of a body, and their rates. */
 function pose(body, at) {
-  const now = between(body.pose, 7, at);
+  const now = between(body.pose, 7, at), rateR = rate(body.pose, 7, at).slice(0, 3);
   const [before, after] = [at.row, at.next].map((row) => rotation(Array.from(body.pose.subarray(7 * row + 3, 7 * row + 7))));
-  return {
-    R: now.slice(0, 3), A: rotation(now.slice(3)), rateR: rate(body.pose, 7, at).slice(0, 3),
-    rateA: before.map((a, k) => (at.step > 0 ? (after[k] - a) / at.step : 0)),
-  };
+  const rateA = before.map((a, k) => (at.step > 0 ? (after[k] - a) / at.step : 0));
+  return { R: now.slice(0, 3), A: rotation(now.slice(3)), rateR, rateA };
 }

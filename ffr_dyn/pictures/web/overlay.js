@@ -1,12 +1,10 @@
 // Lines and words over the bodies: joints, forces, markers, paths, the colour bar.
 
 const over = $("over").getContext("2d");
-let taken = []; // places and widths of words in a picture
-let pixels; // point in space -> point on the screen
+let taken = [], pixels; // places and widths of words in a picture; point in space -> point on the screen
 
 function line(points, colour, width = 1.5, dash = []) {
-  over.strokeStyle = colour;
-  over.lineWidth = width;
+  Object.assign(over, { strokeStyle: colour, lineWidth: width });
   over.setLineDash(dash);
   over.beginPath();
   points.forEach((point, k) => over[k ? "lineTo" : "moveTo"](...pixels(point)));
@@ -23,11 +21,8 @@ function label(text, [x, y], colour = INK) {
 }
 
 function words(text, [x, y], colour = INK, align = "left") {
-  over.textAlign = align;
-  over.lineWidth = 3;
-  over.strokeStyle = "rgba(255,255,255,0.85)";
+  Object.assign(over, { textAlign: align, lineWidth: 3, strokeStyle: "rgba(255,255,255,0.85)", fillStyle: colour });
   over.strokeText(text, x, y);
-  over.fillStyle = colour;
   over.fillText(text, x, y);
 }
 
@@ -57,13 +52,9 @@ function frame(R, A, length, letters) {
 /** A joint: a ring at its place, its axis through it. */
 function drawJoint(joint, at, named) {
   const R = between(joint.at, 3, at), [x, y] = pixels(R), size = 0.06 * about.size;
-  if (joint.axis) {
-    const axis = between(joint.axis, 3, at);
-    line([add(R, axis, -size), add(R, axis, size)], "#8B1A8B", 2, [8, 3, 2, 3]);
-  }
-  over.fillStyle = "white";
-  over.strokeStyle = "#8B1A8B";
-  over.lineWidth = 2;
+  const axis = joint.axis && between(joint.axis, 3, at);
+  if (axis) line([add(R, axis, -size), add(R, axis, size)], "#8B1A8B", 2, [8, 3, 2, 3]);
+  Object.assign(over, { fillStyle: "white", strokeStyle: "#8B1A8B", lineWidth: 2 });
   over.beginPath();
   if (joint.kind === "fixed") over.rect(x - 5, y - 5, 10, 10); else over.arc(x, y, 5, 0, 2 * Math.PI);
   over.fill();
@@ -73,39 +64,33 @@ function drawJoint(joint, at, named) {
 
 function drawOver(at, width, height) {
   const half = 0.5 * height / camera.reach, [right, up] = camera.axes, named = $("names").checked;
-  pixels = (point) => {
-    const from = add(point, camera.target, -1);
-    return [width / 2 + half * dot(right, from), height / 2 - half * dot(up, from)];
-  };
+  const seen = (axis, point) => half * (dot(axis, point) - dot(axis, camera.target));
+  pixels = (point) => [width / 2 + seen(right, point), height / 2 - seen(up, point)];
   taken = [];
   over.clearRect(0, 0, width, height);
   over.font = "13px system-ui, sans-serif";
-  for (const trace of about.traces) {
-    if (trace.shown === false) continue;
-    line(Array.from({ length: trace.points.length / 3 }, (_, k) => trace.points.subarray(3 * k, 3 * k + 3)), trace.colour);
-  }
-  const ground = about.triad;
-  frame(ground.at, IDENTITY, 0.1 * about.size, true);
+  for (const { points, colour } of about.traces.filter((one) => one.shown))
+    line(Array.from({ length: points.length / 3 }, (_, k) => points.subarray(3 * k, 3 * k + 3)), colour);
+  frame(about.triad.at, IDENTITY, 0.1 * about.size, true);
   if ($("frames").checked)
     for (const body of about.bodies.filter((one) => one.shown)) {
       const { R, A } = pose(body, at);
       frame(R, A, 0.06 * about.size, false);
       if (named) label(body.name, pixels(R).map((c, k) => c + [6, -6][k]));
     }
-  for (const joint of about.joints) if (joint.shown) drawJoint(joint, at, named);
-  for (const marker of about.markers) {
-    if (!marker.shown) continue;
+  about.joints.filter((one) => one.shown).forEach((joint) => drawJoint(joint, at, named));
+  for (const marker of about.markers.filter((one) => one.shown)) {
     const [x, y] = pixels(between(marker.at, 3, at));
     over.fillStyle = INK;
     over.fillRect(x - 2, y - 2, 4, 4);
     if (named) label(marker.name, [x + 5, y + 12]);
   }
-  for (const load of about.arrows) {
-    if (!load.shown) continue;
-    const from = between(load.at, 3, at), vector = between(load.vector, 3, at);
-    const largest = Math.max(...about.arrows.filter((o) => o.shown && o.unit === load.unit).map((o) => o.largest)) || 1;
-    const to = add(from, vector, 0.25 * about.size / largest), colour = load.unit === "N" ? "#D55E00" : "#0072B2";
-    arrow(from, to, colour, load.unit === "N" ? 1 : 2);
+  const loads = about.arrows.filter((one) => one.shown);
+  for (const load of loads) {
+    const from = between(load.at, 3, at), vector = between(load.vector, 3, at), force = load.unit === "N";
+    const largest = Math.max(...loads.filter((one) => one.unit === load.unit).map((one) => one.largest)) || 1;
+    const to = add(from, vector, 0.25 * about.size / largest), colour = force ? "#D55E00" : "#0072B2";
+    arrow(from, to, colour, force ? 1 : 2);
     if (named) label(`${load.name} ${short(Math.hypot(...vector))} ${load.unit}`, pixels(to).map((c) => c + 5), colour);
   }
   drawBar(width, height);
@@ -114,14 +99,13 @@ function drawOver(at, width, height) {
 const short = (x) => (Math.abs(x) < 1e-3 && x ? x.toExponential(2) : String(Number(x.toPrecision(4))));
 
 function drawBar(width, height) {
-  const colour = about.colours[state.colour];
+  const colour = about.colours[state.colour], high = state.limits[state.colour], low = colour.low < 0 ? -high : 0;
   if (!colour.map) return;
   const x = width - 74, y = 0.28 * height, tall = 0.46 * height, shades = array(colour.map), count = shades.length / 3;
   for (let k = 0; k < count; k++) {
-    over.fillStyle = `rgb(${shades[3 * k]},${shades[3 * k + 1]},${shades[3 * k + 2]})`;
+    over.fillStyle = `rgb(${shades.subarray(3 * k, 3 * k + 3)})`;
     over.fillRect(x, y + tall * (1 - (k + 1) / count), 16, tall / count + 1);
   }
-  const high = state.limits[state.colour], low = colour.low < 0 ? -high : 0;
   for (let k = 0; k < 5; k++) words(short((low + 0.25 * k * (high - low)) * colour.factor), [x + 20, y + tall * (1 - k / 4) + 4]);
   const title = [...colour.words.split(" "), colour.unit && `[${colour.unit}]`].filter(Boolean);
   title.forEach((word, k) => words(word, [x + 16, y - 12 - 16 * (title.length - 1 - k)], INK, "center"));

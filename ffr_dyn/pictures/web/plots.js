@@ -24,10 +24,8 @@ function drawPanel(pen, group, top, tall, width) {
   let [low, high] = [Math.min, Math.max].map((end) => histories.flat().reduce((a, b) => end(a, b)));
   if (!(high > low)) [low, high] = [low - 1, high + 1];
   const y = (v) => top + tall * (1 - (v - low) / (high - low));
-  pen.strokeStyle = "#cccccc";
+  Object.assign(pen, { strokeStyle: "#cccccc", fillStyle: INK, textAlign: "right" });
   pen.strokeRect(LEFT, top, width - LEFT - 12, tall);
-  pen.fillStyle = INK;
-  pen.textAlign = "right";
   for (const v of [low, high]) pen.fillText(short(v), LEFT - 5, y(v) + 4);
   pen.fillText(`[${group[0].unit}]`, LEFT - 5, top + tall / 2 + 4);
   pen.textAlign = "left";

@@ -4,8 +4,7 @@
 const smooth = $("solid").getContext("webgl2", { antialias: true, failIfMajorPerformanceCaveat: true });
 const gl = smooth || $("solid").getContext("webgl2", { antialias: false });
 const sharpness = () => (smooth || !state.playing ? 1 : 0.75);
-let blank; // a texture where no colour map is needed
-let motion, drawing; // programs, each with its uniforms
+let blank, motion, drawing; // a texture where no colour map is needed; programs, each with its uniforms
 
 function compiled(vertex, fragment, attributes, written) {
   const program = gl.createProgram(), uniforms = {};
@@ -21,11 +20,15 @@ function compiled(vertex, fragment, attributes, written) {
   gl.linkProgram(program);
   if (!gl.getProgramParameter(program, gl.LINK_STATUS)) throw new Error(gl.getProgramInfoLog(program));
   for (let k = 0; k < gl.getProgramParameter(program, gl.ACTIVE_UNIFORMS); k++) {
-    const name = gl.getActiveUniform(program, k).name;
-    uniforms[name.replace("[0]", "")] = gl.getUniformLocation(program, name);
+    const { name, type } = gl.getActiveUniform(program, k), at = gl.getUniformLocation(program, name);
+    const how = { [gl.FLOAT]: "uniform1fv", [gl.FLOAT_VEC2]: "uniform2fv", [gl.FLOAT_VEC3]: "uniform3fv" }[type] || "uniform1iv";
+    uniforms[name.replace("[0]", "")] = type === gl.FLOAT_MAT3 ? (A) => gl.uniformMatrix3fv(at, false, A) : (v) => gl[how](at, v.length ? v : [v]);
   }
   return { program, uniforms };
 }
+
+/** Set uniforms of the program in use; the compiler leaves out those that change nothing. */
+const give = ({ uniforms }, values) => Object.entries(values).forEach(([name, value]) => uniforms[name]?.(value));
 
 function texture(inner, format, type, width, height, data, filter) {
   const made = gl.createTexture();
@@ -70,10 +73,7 @@ function vertices(attributes, corners) {
 function loadSurface(surface) {
   const points = buffer(gl.ARRAY_BUFFER, array(surface.points)), moduli = surface.moduli && buffer(gl.ARRAY_BUFFER, array(surface.moduli));
   Object.assign(surface, { size: surface.points[2] / 3, count: surface.triangles[2], lines: surface.edges[2] });
-  const corners = new Uint32Array(surface.count + surface.lines);
-  corners.set(array(surface.triangles));
-  corners.set(array(surface.edges), surface.count);
-  surface.corners = buffer(gl.ELEMENT_ARRAY_BUFFER, corners);
+  surface.corners = buffer(gl.ELEMENT_ARRAY_BUFFER, Uint32Array.from([...array(surface.triangles), ...array(surface.edges)]));
   surface.still = vertices([[points, 3, 0, 0], [moduli, 2, 0, 0]]);
   surface.undeformed = vertices([[points, 3, 0, 0]], surface.corners);
   surface.shapeTexture = shapesTexture(array(surface.shapes));
@@ -100,34 +100,30 @@ function load() {
   about.bodies.forEach(loadBody);
   for (const colour of about.colours)
     if (colour.map) colour.texture = texture(gl.RGB8, gl.RGB, gl.UNSIGNED_BYTE, colour.map[2] / 3, 1, array(colour.map), gl.LINEAR);
-  for (const thing of [...about.joints, ...about.markers, ...about.arrows]) thing.at = array(thing.at);
-  for (const joint of about.joints) joint.axis = joint.axis && array(joint.axis);
-  for (const arrow of about.arrows) arrow.vector = array(arrow.vector);
-  for (const trace of about.traces) trace.points = array(trace.points);
-  for (const series of about.series) series.values = array(series.values);
+  for (const thing of [...about.joints, ...about.markers, ...about.arrows, ...about.traces, ...about.series])
+    for (const key of ["at", "axis", "vector", "points", "values"]) if (thing[key]) thing[key] = array(thing[key]);
 }
 
 /** The points of a body at a time. */
 function move(body, at) {
   const surface = about.surfaces[body.surface], here = pose(body, at), there = pose(about.bodies[body.frame], at);
-  const { uniforms } = motion, count = surface.scales.length, tensors = surface.tensorScales, colour = colourOf(body);
-  for (const key of ["A", "rateA"]) gl.uniformMatrix3fv(uniforms[key], false, here[key]);
-  gl.uniformMatrix3fv(uniforms.A0, false, there.A);
-  for (const [key, vector] of [["R", here.R], ["R0", there.R], ["rateR", here.rateR]]) gl.uniform3fv(uniforms[key], vector);
-  const now = between(body.weights, count, at), rates = rate(body.weights, count, at), weights = new Float32Array(3 * MOST_SHAPES);
-  surface.scales.forEach((scale, k) => {
+  const count = surface.scales.length, tensors = surface.tensorScales, colour = colourOf(body), limit = state.limits[state.colour];
+  const now = between(body.weights, count, at), rates = rate(body.weights, count, at);
+  const weights = surface.scales.flatMap((scale, k) => {
     const drawn = body.parted ? 1 : k < surface.linear ? state.scale : state.scale * state.scale;
-    weights.set([scale * now[k] * drawn, scale * now[k], scale * rates[k]], 3 * k);
+    return [scale * now[k] * drawn, scale * now[k], scale * rates[k]];
   });
-  gl.uniform3fv(uniforms.weights, weights);
-  gl.uniform1i(uniforms.shapeCount, count);
-  if (tensors.length) gl.uniform1fv(uniforms.stresses, between(body.tensors, tensors.length, at).map((w, k) => w * tensors[k]));
-  gl.uniform1i(uniforms.tensorCount, tensors.length);
-  gl.uniform1f(uniforms.blend, body.parted ? state.scale : 1);
-  gl.uniform1i(uniforms.kind, colour ? colour.kind : 0);
-  gl.uniform1i(uniforms.measure, colour ? colour.measure : 0);
-  gl.uniform2f(uniforms.range, colour && colour.low < 0 ? -state.limits[state.colour] : 0, state.limits[state.colour]);
-  [surface.shapeTexture, surface.tensorTexture, colour ? colour.texture : blank].forEach((of, k) => { gl.activeTexture(gl.TEXTURE0 + k); gl.bindTexture(gl.TEXTURE_2D, of); });
+  give(motion, {
+    R: here.R, A: here.A, rateR: here.rateR, rateA: here.rateA, R0: there.R, A0: there.A, blend: body.parted ? state.scale : 1,
+    shapeCount: count, tensorCount: tensors.length, kind: colour ? colour.kind : 0, measure: colour ? colour.measure : 0,
+    range: [colour && colour.low < 0 ? -limit : 0, limit],
+  });
+  if (count) give(motion, { weights });
+  if (tensors.length) give(motion, { stresses: between(body.tensors, tensors.length, at).map((w, k) => w * tensors[k]) });
+  [surface.shapeTexture, surface.tensorTexture, colour ? colour.texture : blank].forEach((of, k) => {
+    gl.activeTexture(gl.TEXTURE0 + k);
+    gl.bindTexture(gl.TEXTURE_2D, of);
+  });
   gl.bindVertexArray(surface.still);
   gl.bindBufferBase(gl.TRANSFORM_FEEDBACK_BUFFER, 0, body.moved);
   gl.beginTransformFeedback(gl.POINTS);
@@ -138,9 +134,7 @@ function move(body, at) {
 
 function moveAll(at) {
   gl.useProgram(motion.program);
-  gl.uniform1i(motion.uniforms.shapes, 0);
-  gl.uniform1i(motion.uniforms.tensors, 1);
-  gl.uniform1i(motion.uniforms.map, 2);
+  give(motion, { shapes: 0, tensors: 1, map: 2 });
   gl.enable(gl.RASTERIZER_DISCARD);
   about.bodies.filter((body) => body.shown).forEach((body) => move(body, at));
   gl.disable(gl.RASTERIZER_DISCARD);
@@ -157,16 +151,9 @@ const IDENTITY = [1, 0, 0, 0, 1, 0, 0, 0, 1];
 
 /** One thing drawn: rest, where it is drawn undeformed; lift, towards the eye; mapped, by the colour of each point. */
 function paint(from, what, { rest, lift = 0, colour, opacity = 1, mapped = false, shaded = true }) {
-  const { uniforms } = drawing, translucent = opacity < 1;
-  gl[translucent ? "enable" : "disable"](gl.BLEND);
-  gl.depthMask(!translucent);
-  gl.uniformMatrix3fv(uniforms.A, false, rest ? rest.A : IDENTITY);
-  gl.uniform3fv(uniforms.R, rest ? rest.R : [0, 0, 0]);
-  gl.uniform1f(uniforms.lift, lift);
-  gl.uniform1i(uniforms.shaded, shaded);
-  gl.uniform1i(uniforms.mapped, mapped);
-  gl.uniform3fv(uniforms.colour, colour);
-  gl.uniform1f(uniforms.opacity, opacity);
+  gl[opacity < 1 ? "enable" : "disable"](gl.BLEND);
+  gl.depthMask(opacity === 1);
+  give(drawing, { A: rest ? rest.A : IDENTITY, R: rest ? rest.R : [0, 0, 0], lift, shaded, mapped, colour, opacity });
   gl.bindVertexArray(from);
   gl.drawElements(...what);
 }
@@ -180,10 +167,8 @@ function drawSolids(at, width, height) {
   gl.enable(gl.DEPTH_TEST);
   gl.blendFunc(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA);
   gl.useProgram(drawing.program);
-  const { uniforms } = drawing, [right, up, towards] = camera.axes;
-  gl.uniformMatrix3fv(uniforms.view, false, [0, 1, 2].flatMap((c) => [right[c], up[c], towards[c]]));
-  gl.uniform3fv(uniforms.target, camera.target);
-  gl.uniform3f(uniforms.zoom, height / width / camera.reach, 1 / camera.reach, 1 / (2 * about.size + camera.reach));
+  const zoom = [height / width / camera.reach, 1 / camera.reach, 1 / (2 * about.size + camera.reach)];
+  give(drawing, { view: [0, 1, 2].flatMap((c) => camera.axes.map((axis) => axis[c])), target: camera.target, zoom });
   for (const body of about.bodies.filter((one) => one.shown).sort((a, b) => a.faint - b.faint)) {
     const surface = about.surfaces[body.surface], opacity = body.faint ? 0.3 : 1;
     gl[surface.closed ? "enable" : "disable"](gl.CULL_FACE); // nobody sees the inside

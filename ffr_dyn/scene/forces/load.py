@@ -12,7 +12,7 @@ from ffr_dyn.scene.fields import OfMotion, Three
 from ffr_dyn.scene.force_kinds import register_force
 from ffr_dyn.scene.forces.force import Force, LawNumbers, LoadTable, Moment
 from ffr_dyn.scene.forces.given import given_numbers, is_number
-from ffr_dyn.scene.forces.places import AtMarker
+from ffr_dyn.scene.forces.places import FORCE_AND_MOMENT, AtMarker
 from ffr_dyn.scene.scene import Scene
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
@@ -63,7 +63,11 @@ class Load(Force):
 
     @property
     def place(self) -> AtMarker:
-        return AtMarker(self.marker, self.axes)
+        acting = (
+            self.function is not None or any(not is_number(c) or c for c in of) for of in (self.force, self.moment)
+        )
+        measured = tuple(one for one, acts in zip(FORCE_AND_MOMENT, acting, strict=True) if acts)
+        return AtMarker(self.marker, self.axes, measured)
 
     def law(self, now: Moment, c: Any, rate: Any) -> Array:
         values = np.array([now.value(component)[0] for component in (*self.force, *self.moment)])

@@ -52,6 +52,10 @@ class Measured:
     sign: float = 1.0
 
 
+FORCE_AND_MOMENT = (
+    Measured("force", "N", "force, in the axes of the load", 0, 3),
+    Measured("moment", "N m", "moment, in the axes of the load", 3, 3),
+)
 _ON_LINE = (
     Measured("tension", "N", "spring-damper force, tension positive", FORCE, sign=-1.0),
     Measured("length", "m", "distance of the ends", COORDINATE),
@@ -123,11 +127,16 @@ class Place(ABC):
 class AtMarker(Place):
     """A marker; axes "global", or "body" for those of its body.
 
+    measured : what a result keeps of the force and the moment there, six numbers in these axes
+
     >>> place = fd.AtMarker("rod.tip", axes="body")
     """
 
+    initial = (0.0,) * 6
+
     marker: str
     axes: str = "global"
+    measured: tuple[Measured, ...] = ()
 
     @property
     def way(self) -> str:

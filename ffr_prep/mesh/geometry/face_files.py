@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,8 +14,8 @@ from ffr_prep.mesh.file_mesh import FileSkin
 from ffr_prep.mesh.formats import format_of
 from ffr_prep.mesh.geometry.drawn import face_of
 from ffr_prep.mesh.geometry.face import METRES
-from ffr_prep.mesh.geometry.faces import Faces
-from ffr_prep.mesh.geometry.regions import found
+from ffr_prep.mesh.geometry.faces import SHOWN, Faces
+from ffr_prep.mesh.geometry.regions import found, query_for
 from ffr_prep.mesh.geometry.skin import mesh_faces
 from ffr_prep.mesh.gmsh_files import skin_from_gmsh
 from ffr_prep.mesh.mesh import cad_settings, check_request, doubtful_unit, facet_triangles, read_mesh
@@ -48,10 +49,11 @@ def faces(
     check_request(path, unit, size, numbers, 1)
     settings = cad_settings(path, glue=glue, solids=solids)
     if not format_of(path).geometry:
-        return mesh_faces(read_mesh(path, unit=unit))
-    with reading(path, "a geometry"):
-        skin = skin_from_gmsh(path, unit=unit, size=size, numbers=numbers, **settings)
-    return skin_faces(skin)
+        made = mesh_faces(read_mesh(path, unit=unit))
+    else:
+        with reading(path, "a geometry"):
+            made = skin_faces(skin_from_gmsh(path, unit=unit, size=size, numbers=numbers, **settings))
+    return replace(made, typed=tuple(query_for(made, feature) for feature in made.features[:SHOWN]))
 
 
 def found_faces(faces: Faces, region: str) -> tuple[str, ...]:

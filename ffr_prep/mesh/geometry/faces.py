@@ -17,7 +17,7 @@ from ffr_prep.common.brief import Brief, Rows, numbers
 from ffr_prep.mesh.geometry.face import METRES, Face
 from ffr_prep.mesh.geometry.face_table import FaceTable, face_table, features_of
 
-_SHOWN = 60
+SHOWN = 60  # features that a table has
 
 
 @dataclass(frozen=True, repr=False)
@@ -30,6 +30,7 @@ class Faces(Brief):
     unit      : in which the file has its lengths, in which they are shown and typed: "m", "cm", "mm" or "in"
     tolerance : within which places and radii are the same, of the size of the body
     notes     : what is to be known, in words
+    typed     : what to type for each of the first features, as the table shows it
     size      : the diagonal of the box around all [m]
     features  : the numbers of the faces of each feature
     table     : the faces as arrays
@@ -43,6 +44,7 @@ class Faces(Brief):
     unit: str = "m"
     tolerance: float = 1e-5
     notes: tuple[str, ...] = ()
+    typed: tuple[str, ...] = ()
     size: float = field(init=False)
     features: tuple[tuple[int, ...], ...] = field(init=False)
     table: FaceTable = field(init=False)
@@ -61,8 +63,10 @@ class Faces(Brief):
         return f"{len(self.faces)} faces, {len(self.features)} features"
 
     def _rows(self) -> Rows:
-        rows = [(self.faces[of[0]].name, feature_in_words(self, of)) for of in self.features[:_SHOWN]]
-        left = len(self.features) - _SHOWN
+        words = [feature_in_words(self, of) for of in self.features[:SHOWN]]
+        told = [f"{typed}  ({text})" for typed, text in zip(self.typed, words, strict=False)] or words
+        rows = [(self.faces[of[0]].name, text) for of, text in zip(self.features, told, strict=False)]
+        left = len(self.features) - SHOWN
         return [*rows, ("...", f"{left} more")] if left > 0 else rows
 
 

@@ -36,7 +36,7 @@ class Krylov:
     """Response to the interface loads and its derivatives by the squared frequency, at one or several frequencies.
 
     moments     : blocks of six vectors per interface at each frequency
-    frequencies : where the receptances are matched [Hz]; each other than zero costs a factorisation of K - omega^2 M
+    frequencies : (f,) where the receptances are matched [Hz]; each other than zero costs a factorisation of K - omega^2 M
 
     Raises InputError for less than one block, for no frequency and for a negative one.
 

@@ -6,6 +6,7 @@ import re
 import zlib
 from dataclasses import replace
 from html.parser import HTMLParser
+from importlib.resources import files
 from io import BytesIO
 
 import numpy as np
@@ -206,6 +207,14 @@ def test_a_page_holds_everything_and_fetches_nothing(tmp_path):
     np.testing.assert_allclose(values, result["rod.tip.position.y"], atol=1e-4)
 
 
+def test_the_viewer_is_small():
+    """Lines of JavaScript but for comments, and the shaders."""
+    scripts = [of for of in files("ffr_dyn.pictures").joinpath("web").iterdir() if of.name.endswith(".js")]
+    lines = [line for of in scripts if of.name != "shaders.js" for line in of.read_text("utf-8").splitlines()]
+    assert len([line for line in lines if not re.match(r"\s*(//|/\*\*.*\*/|$)", line)]) <= 500
+    assert max(map(len, lines)) <= 150
+
+
 def test_titles_cannot_break_a_page():
     viewer = fd.animate(replace(rotating_box(), attributes={"title": "</script><b>"}))
     assert "</script><b>" not in viewer.text
@@ -258,7 +267,11 @@ def pendulum():
     scene = fd.Scene(
         (fd.Body("arm", arm),),
         (fd.Joint("hinge", "revolute", "ground.wall", "arm.hinge", axis=(0, 0, 1)),),
-        loads=(fd.Load("weight", "arm.tip", force=(0, -5.0, 0), axes="body"),),
+        loads=(
+            fd.Load("weight", "arm.tip", force=(0, -5.0, 0), axes="body"),
+            fd.Load("gust", "arm.tip", force=(fd.harmonic(amplitude=2.0, frequency=1.0), 0, 0)),
+            fd.Load("drag", "arm.tip", function=lambda t, state: -0.1 * state.velocity("arm.tip")),
+        ),
         springs=(fd.SpringDamper("spring", "ground.hook", "arm.tip", stiffness=20.0, free_length=0.5),),
         ground={"wall": (0, 0, 0), "hook": (1.0, 2.0, 0)},
         name="pendulum",
@@ -273,7 +286,10 @@ def test_joints_forces_and_markers_are_where_the_result_has_them():
     assert joint["label"] == "hinge (revolute)"
     np.testing.assert_allclose(page.array(*joint["axis"]).reshape(-1, 3), [[0, 0, 1]] * len(result.time), atol=1e-4)
     arrows = {arrow["name"]: arrow for arrow in page.about["arrows"]}
-    assert set(arrows) == {"hinge.force", "weight.force", "spring.tension"}
+    assert set(arrows) == {"hinge.force", "weight.force", "gust.force", "drag.force", "spring.tension"}
+    gust, drag = (page.array(*arrows[f"{name}.force"]["vector"]).reshape(-1, 3) for name in ("gust", "drag"))
+    np.testing.assert_allclose(gust[:, 0], 2.0 * np.sin(2 * np.pi * result.time), atol=1e-3)
+    np.testing.assert_allclose(drag, -0.1 * result["arm.tip.velocity"], atol=1e-3 * np.abs(drag).max())
     force = page.array(*arrows["hinge.force"]["vector"]).reshape(-1, 3)
     np.testing.assert_allclose(force, result["hinge.force"], atol=1e-3 * np.abs(result["hinge.force"]).max())
     pull, tip = page.array(*arrows["spring.tension"]["vector"]).reshape(-1, 3), result["arm.tip.position"]

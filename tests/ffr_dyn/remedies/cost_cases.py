@@ -27,7 +27,7 @@ from ffr_dyn.economy.search import economise
 from ffr_dyn.integrators.stabilisation import Projection
 from ffr_dyn.scene.forces import SpringDamper
 from ffr_dyn.scene.scene import Body, Scene
-from ffr_dyn.variants.variant import basis_of, stiffening_by, vary, with_model
+from ffr_dyn.variants.variant import basis_of, stiffening_by, vary, with_model, with_modes
 from ffr_prep.common.errors import ComputationError
 
 p = partial
@@ -165,6 +165,7 @@ VARIANTS = [
     Case(p(with_model, Body("cloud", cloud(2)), LESS), p(with_model, Body("cloud", LESS), cloud(2))),
     Case(p(with_model, Body("c", cloud(2), damping=(0.1, 0.2)), cloud(3)),
          p(with_model, Body("c", cloud(2), damping=0.1), cloud(3))),
+    Case(p(with_modes, SWING, 1), p(vary, SWING, modes=1)),
     Case(lambda: vary(SWING, modes={"clod": 1}), lambda: vary(SWING, modes={"cloud": 1})),
 ]  # fmt: skip
 CASES = CHARTS + ECONOMY + VARIANTS

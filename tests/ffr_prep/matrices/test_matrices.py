@@ -136,7 +136,7 @@ def test_point_masses_with_rotary_inertia():
     rotary = [a @ a.T for a in rng.normal(size=(5, 3, 3))]
     dofs = DofMap(np.repeat(np.arange(5), 6), np.tile(np.arange(6), 5), 5)
     blocks = [scipy.linalg.block_diag(m * np.eye(3), J) for m, J in zip(masses, rotary, strict=True)]
-    M = sp.csr_array(sp.block_diag(blocks))
+    M = sp.csr_array(sp.block_diag([sp.coo_array(block) for block in blocks]))
     integrals, _ = nodal_integrals(points, dofs, M, np.zeros((30, 0)))
     parts = zip(masses, points, rotary, strict=True)
     J = sum(m * (x @ x * np.eye(3) - np.outer(x, x)) + of_node for m, x, of_node in parts)

@@ -115,6 +115,14 @@ def test_frames_of_beams_convert_with_their_section_forces():
     np.testing.assert_allclose(converted.surface.beams.modes * s, forces, atol=1e-6 * np.abs(forces).max())
 
 
+def test_models_of_every_kind_find_interfaces_where_they_are():
+    frame = fp.from_frame(space_frame(), regions("a", "b", "c"))
+    request = fp.Request(
+        name="f", reference=SimplySupported("nearest 0.1,0,0", "plane x=1.1"), reduction=CraigBampton(2)
+    )
+    assert fp.reduce(frame, request).provenance["reference"] == {"type": "SimplySupported", "pin": "a", "roller": "b"}
+
+
 def test_the_mean_axis_leaves_no_momentum(bodies):
     converted = with_reference(bodies[FixedTo("left")], MeanAxis())
     assert np.abs(converted.P_dm).max() < 1e-10
@@ -199,6 +207,19 @@ def test_the_examples_of_the_documentation_run(tmp_path, monkeypatch):
 
 
 # ---- guards -----------------------------------------------------------------------------------------------------------
+
+
+def test_interfaces_are_found_where_they_are(bodies):
+    body = bodies[next(iter(bodies))]
+    near, far = body.interfaces[:2]
+    place = "nearest " + ",".join(f"{x:.17g}" for x in far.position)
+    np.testing.assert_array_equal(
+        with_reference(body, FixedTo(place)).omega2, with_reference(body, FixedTo(far.name)).omega2
+    )
+    told = with_reference(body, SimplySupported(near.name, place)).provenance["reference"]
+    assert told == with_reference(body, SimplySupported(near.name, far.name)).provenance["reference"]
+    with pytest.raises(InputError, match=r"name the one that is meant|finds no node"):
+        with_reference(body, FixedTo("plane z=0"))
 
 
 def test_conditions_that_cannot_be(bodies):

@@ -62,6 +62,7 @@ def test_faces_show_themselves_in_short(faces):
     assert repr(faces).startswith("22 faces, 10 features")
     assert len(repr(faces)) < 1000
     assert faces._repr_html_().count("<tr>") == 10
+    assert "<td>plane z=5mm  (plane, normal " in faces._repr_html_()
 
 
 def test_the_picture_numbers_what_is_seen(faces, tmp_path):
