@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 from boxes import STEEL, box_mesh, shaken
+from scipy.sparse.csgraph import maximum_flow
 
 from ffr_prep.solids.assembly import assemble
 from ffr_prep.solvers.cholesky import cholesky, solve_cholesky
 from ffr_prep.solvers.nested_dissection import _cut, elimination_tree
+from ffr_prep.solvers.separators import separated
 
 
 def assert_solves(A, positions, columns=3, rel=1e-9):
@@ -114,13 +116,47 @@ def test_pieces_below_a_piece_precede_it_and_separate_its_halves():
 
 
 def test_the_separator_is_a_smallest_one():
-    """A comb of 20 points on a line, each touching the ten on the other side of the cut: the spine alone separates."""
+    """A comb of 20 points on a line, each touching the ten on the other side of the middle: a point of the spine separates."""
     points = np.column_stack([np.arange(20.0), np.zeros((20, 2))])
     edges = sp.lil_array((20, 20))
     for spine, tooth in [(9, k) for k in range(10, 20)] + [(10, k) for k in range(9)]:
         edges[spine, tooth] = edges[tooth, spine] = 1
-    _, _, separator = _cut(points, sp.csr_array(edges), np.arange(20), np.full(20, -1))
-    np.testing.assert_array_equal(separator, [9, 10])
+    place = np.full(20, -1)
+    one, two, separator = _cut(points, sp.csr_array(edges), np.arange(20), place)
+    assert separator.tolist() in ([9], [10])
+    assert (place == -1).all()
+    np.testing.assert_array_equal(np.sort(np.concatenate([one, two, separator])), np.arange(20))
+
+
+@pytest.mark.parametrize("near", [0.1, 0.16, 0.3, 2.0])
+def test_no_separator_is_smaller(near):
+    """Random points that touch those near them: as SciPy's largest flow through points of capacity one counts."""
+    rng = np.random.default_rng(int(100 * near))
+    points = rng.random((150, 3)) * [2.0, 1.0, 0.2]
+    distances = np.linalg.norm(points[:, None] - points, axis=2)
+    graph = sp.csr_array((distances < near) & ~np.eye(150, dtype=bool))
+    ordered = np.argsort(points[:, 0])
+    one, two, separator = separated(graph.indptr, graph.indices, ordered, 40, 110, np.full(150, -1))
+    assert not graph[one][:, two].nnz
+    assert set(ordered[110:]) <= set(two) | set(separator)
+    touching = ordered[:40][graph[ordered[:40]][:, ordered[110:]].sum(axis=1) > 0]
+    fixed = np.setdiff1d(ordered[:40], touching)
+    assert len(separator) == _largest_flow(graph, fixed, touching, ordered[110:])
+
+
+def _largest_flow(graph, below, touching, above):
+    """From `below` and `touching` to `above`, with an entry and an exit of each point and one unit between them."""
+    count, many = graph.shape[0], 10**6
+    rows, columns = graph.nonzero()
+    through = np.full(count, 1)
+    through[below] = through[above] = many
+    start, stop = np.concatenate([below, touching]), above
+    ends = np.full(count, 2 * count), np.full(count, 2 * count + 1)
+    i = np.concatenate([np.arange(count), rows + count, ends[0][: start.size], stop + count])
+    j = np.concatenate([np.arange(count) + count, columns, start, ends[1][: stop.size]])
+    units = np.concatenate([through, np.full(rows.size + start.size + stop.size, many)])
+    arcs = sp.csr_array((units.astype(np.int32), (i, j)), shape=(2 * count + 2, 2 * count + 2))
+    return maximum_flow(sp.csr_matrix(arcs), 2 * count, 2 * count + 1).flow_value
 
 
 def test_a_matrix_that_is_not_positive_definite_is_refused():
