@@ -21,17 +21,20 @@ check_compiled_code()
 
 Tree = tuple[list[Array], list[list[int]]]
 
+NOTHING = np.zeros(0, int)
 _LEAF = 40
 _LEAST = 0.25  # of a part on either side of a cut
 
 
-def elimination_tree(A: sp.csr_array, positions: Array) -> Tree:
+def elimination_tree(A: sp.csr_array, positions: Array, held: Array = NOTHING) -> Tree:
     """Pieces of unknowns in the order of their elimination, and for each the earlier pieces directly below it.
 
     All pieces below a piece precede it without a gap. positions : (n, 3) where each unknown is; rows of NaN for
-    unknowns that touch many others, which are eliminated last.
+    unknowns that touch many others, which are eliminated last. held : numbers of those that belong to no piece.
     """
-    placed = np.flatnonzero(np.isfinite(positions[:, 0]))
+    free = np.ones(len(positions), bool)
+    free[held] = False
+    placed = np.flatnonzero(np.isfinite(positions[:, 0]) & free)
     points, index = np.unique(positions[placed], axis=0, return_inverse=True)
     point_of = np.full(len(positions), -1)
     point_of[placed] = index.ravel()
@@ -39,7 +42,8 @@ def elimination_tree(A: sp.csr_array, positions: Array) -> Tree:
     ends = np.searchsorted(point_of[by_point], np.arange(len(points) + 1))
     pieces, children = _dissection(points, _graph(A, point_of, by_point, ends))
     unknowns = [_joined(by_point, ends, piece) for piece in pieces]
-    last = np.setdiff1d(np.arange(len(positions)), placed)
+    free[placed] = False
+    last = np.flatnonzero(free)
     if last.size:
         children.append(_tops(children))
         unknowns.append(last)
