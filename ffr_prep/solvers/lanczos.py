@@ -25,6 +25,7 @@ from ffr_prep.solvers.threads import Map, pieces, sparse_product, threads
 
 _RESIDUAL = 1e-9
 _DEPENDENT = 1e-10
+_AMPLIFIED = 1e-3  # of the rounding where a direction of a block is as small as this beside its largest
 _PANEL = 64
 _MANY = 100  # modes whose convergence is looked at after some passes only, as that takes the cube of the vectors
 _OFTEN = 1.03
@@ -51,11 +52,12 @@ def lowest_modes(
     Q = SearchSpace([])
     T = np.zeros((0, 0))
     due = count if count > _MANY else 0
-    block, momenta, _ = _orthonormal(flexibility(M @ start), Q, M)
+    block, momenta, _ = _orthonormal(flexibility(M @ start), Q, M, 0)
     while True:
+        coupled = max(Q.size - block.shape[1], 0)
         _append(Q, block)
         following = flexibility(momenta)
-        block, momenta, columns = _orthonormal(following, Q, M)
+        block, momenta, columns = _orthonormal(following, Q, M, coupled)
         T = _bordered(T, columns)
         full = len(T) + block.shape[1] > most or not block.size
         if len(T) < due and not full:
@@ -83,28 +85,37 @@ def _bordered(T: Array, columns: Array) -> Array:
     return np.block([[T, columns[:old]], [columns[:old].T, (corner + corner.T) / 2]])
 
 
-def _orthonormal(vectors: Array, Q: SearchSpace, M: sp.csr_array) -> tuple[Array, Array, Array]:
+def _orthonormal(vectors: Array, Q: SearchSpace, M: sp.csr_array, coupled: int) -> tuple[Array, Array, Array]:
     """What the vectors (Z, b) add to Q: an M-orthonormal basis, M times it, and the coordinates Q^T M of the vectors.
 
-    A second pass removes the rounding of the first.
+    But for rounding the vectors are coupled to those of Q from the number `coupled` on alone. These parts are taken out
+    first; then nothing large is left that a single pass over all of Q would have to take out.
     """
     with threads() as each:
-        momenta = sparse_product(M, vectors, each)
-        coordinates = _coordinates(Q, momenta, each)
-        smallest = _DEPENDENT**2 * np.einsum("zi,zi->i", vectors, momenta).max(initial=0.0)
-        vectors, momenta = _normalised(_removed(vectors, Q, coordinates, each), M, smallest, each)
-        vectors = _removed(vectors, Q, _coordinates(Q, momenta, each), each)
-        vectors, momenta = _normalised(vectors, M, 0.5, each)
+        coordinates = np.zeros((Q.size, vectors.shape[1]))
+        for first in (coupled, 0):
+            momenta = sparse_product(M, vectors, each)
+            if first == coupled:
+                smallest = _DEPENDENT**2 * np.einsum("zi,zi->i", vectors, momenta).max(initial=0.0)
+            parts = _coordinates(Q, momenta, each, first)
+            vectors = _removed(vectors, Q, parts, each)
+            coordinates += parts
+        vectors, momenta, amplified = _normalised(vectors, M, smallest, each)
+        if amplified:
+            vectors = _removed(vectors, Q, _coordinates(Q, momenta, each, 0), each)
+        vectors, momenta, _ = _normalised(vectors, M, 0.5, each)
     return vectors, momenta, coordinates
 
 
-def _normalised(vectors: Array, M: sp.csr_array, smallest: float, each: Map) -> tuple[Array, Array]:
-    """M-orthonormal basis of the vectors without directions of a smaller squared norm, and M times it."""
+def _normalised(vectors: Array, M: sp.csr_array, smallest: float, each: Map) -> tuple[Array, Array, bool]:
+    """M-orthonormal basis of the vectors without directions of a smaller squared norm, M times it, and whether some are so
+    small that their rounding is large."""
     momenta = sparse_product(M, vectors, each)
     squares, axes = scipy.linalg.eigh(vectors.T @ momenta)
     kept = squares > smallest
     combination = axes[:, kept] / np.sqrt(squares[kept])
-    return vectors @ combination, momenta @ combination
+    amplified = bool((squares[kept] < _AMPLIFIED**2 * squares.max(initial=0.0)).any())
+    return vectors @ combination, momenta @ combination, amplified
 
 
 # ---- the search space: rows of panels, which make large products of matrices --------------------------------------
@@ -117,10 +128,14 @@ class SearchSpace:
     panels: list[Array]
     size: int = 0
 
-    @property
-    def used(self) -> list[Array]:
-        """The rows of the panels that are filled."""
-        return [panel[: self.size - k * _PANEL] for k, panel in enumerate(self.panels)]
+    def used(self, first: int = 0) -> list[tuple[slice, Array]]:
+        """The vectors from a number on: their numbers and rows, panel by panel."""
+        filled = []
+        for k, panel in enumerate(self.panels):
+            begin, end = max(first, k * _PANEL), min(self.size, (k + 1) * _PANEL)
+            if begin < end:
+                filled.append((slice(begin, end), panel[begin - k * _PANEL : end - k * _PANEL]))
+        return filled
 
 
 def _append(Q: SearchSpace, block: Array) -> None:
@@ -131,11 +146,14 @@ def _append(Q: SearchSpace, block: Array) -> None:
         Q.size += 1
 
 
-def _coordinates(Q: SearchSpace, momenta: Array, each: Map) -> Array:
-    """(p, b) Q^T momenta."""
+def _coordinates(Q: SearchSpace, momenta: Array, each: Map, first: int) -> Array:
+    """(p, b) Q^T momenta, zero for the vectors before the first."""
 
     def of_rows(part: slice) -> Array:
-        return np.vstack([np.zeros((0, momenta.shape[1])), *(panel[:, part] @ momenta[part] for panel in Q.used)])
+        coordinates = np.zeros((Q.size, momenta.shape[1]))
+        for numbers, rows in Q.used(first):
+            coordinates[numbers] = rows[:, part] @ momenta[part]
+        return coordinates
 
     return np.sum(list(each(of_rows, pieces(len(momenta)))), axis=0)
 
@@ -143,10 +161,11 @@ def _coordinates(Q: SearchSpace, momenta: Array, each: Map) -> Array:
 def _removed(vectors: Array, Q: SearchSpace, coordinates: Array, each: Map) -> Array:
     """(Z, b) vectors - Q coordinates."""
     left = np.array(vectors)
+    involved = np.flatnonzero(coordinates.any(axis=1))
 
     def from_rows(part: slice) -> None:
-        for k, panel in enumerate(Q.used):
-            left[part] -= panel[:, part].T @ coordinates[k * _PANEL : (k + 1) * _PANEL]
+        for numbers, rows in Q.used(int(involved[0]) if involved.size else Q.size):
+            left[part] -= rows[:, part].T @ coordinates[numbers]
 
     for _ in each(from_rows, pieces(len(vectors))):
         pass
