@@ -32,6 +32,7 @@ from ffr_prep.solvers.inertia import modes_below
 from ffr_prep.solvers.lanczos import lowest_modes
 from ffr_prep.solvers.nested_dissection import NOTHING
 from ffr_prep.solvers.slepc import SlepcProcess, mpi_count, mpi_modes, mpi_solve, pencil, started
+from ffr_prep.solvers.threads import product_of_sizes
 from ffr_prep.solvers.verification import Verification, verified
 
 Solve = Callable[[Array], Array]
@@ -317,7 +318,7 @@ def solve_refined(problem: SupportedBody, f: Array, c: Array) -> tuple[Array, Ar
 def _check_residual(problem: SupportedBody, f: Array, u: Array, mu: Array) -> None:
     reaction = problem.C.T @ mu
     residual = np.linalg.norm(f - problem.body.K @ u - reaction)
-    noise = np.linalg.norm(abs(problem.body.K) @ np.abs(u))
+    noise = np.linalg.norm(product_of_sizes(problem.body.K, u))
     allowed = 1e-6 * (np.linalg.norm(f) + np.linalg.norm(reaction)) + 1e-11 * noise
     if not residual <= allowed:
         raise ComputationError(

@@ -174,5 +174,13 @@ def _removed(vectors: Array, Q: SearchSpace, coordinates: Array, each: Map) -> A
 
 def _combined(Q: SearchSpace, coordinates: Array) -> Array:
     """(Z, b) Q coordinates (p, b)."""
+    whole = np.zeros((Q.panels[0].shape[1], coordinates.shape[1]))
+
+    def of_rows(part: slice) -> None:
+        for numbers, rows in Q.used():
+            whole[part] += rows[:, part].T @ coordinates[numbers]
+
     with threads() as each:
-        return -_removed(np.zeros((Q.panels[0].shape[1], coordinates.shape[1])), Q, coordinates, each)
+        for _ in each(of_rows, pieces(len(whole))):
+            pass
+    return whole

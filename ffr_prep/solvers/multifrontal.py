@@ -32,7 +32,7 @@ REALS = types.CPointer(types.float64)
 INTEGERS = types.CPointer(types.int32)
 LETTERS = types.CPointer(types.uint8)
 
-STRIP = 64
+STRIP = 32
 
 
 class Fronts(NamedTuple):

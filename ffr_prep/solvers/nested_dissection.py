@@ -1,7 +1,7 @@
 """Nested dissection: an order of elimination that keeps a sparse factor small.
 
 The unknowns are cut in two across their longest extent, again and again; what separates two parts is eliminated after
-both. The separator is the smallest set of points in the middle half of the extent (`ffr_prep.solvers.separators`), so it
+both. The separator is the smallest set of points in the middle of the extent (`ffr_prep.solvers.separators`), so it
 finds the narrow places of a body and needs not be plane.
 
 Source: A. George, SIAM J. Numer. Anal. 10 (1973) 345-363.
@@ -22,8 +22,8 @@ check_compiled_code()
 Tree = tuple[list[Array], list[list[int]]]
 
 NOTHING = np.zeros(0, int)
-_LEAF = 40
-_LEAST = 0.25  # of a part on either side of a cut
+_LEAF = 16
+_LEAST = 0.2  # of a part on either side of a cut
 
 
 def elimination_tree(A: sp.csr_array, positions: Array, held: Array = NOTHING) -> Tree:

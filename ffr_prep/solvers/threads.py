@@ -85,6 +85,11 @@ def sparse_product(A: sp.csr_array, X: Array, each: Map) -> Array:
     return out
 
 
+def product_of_sizes(A: sp.csr_array, X: Array) -> Array:
+    """|A| |X| for a sparse A (n, m) and X (m, b), without a copy of either."""
+    return np.concatenate([abs(A[rows]) @ np.abs(X) for rows in pieces(A.shape[0])])
+
+
 @numba.njit(cache=True, nogil=True)
 def _multiply(indptr, indices, data, X, out, first, last):  # type: ignore[no-untyped-def]
     for i in range(first, last):
