@@ -10,8 +10,11 @@ Sources: A. George, SIAM J. Numer. Anal. 10 (1973) 345-363 (nested dissection); 
 from __future__ import annotations
 
 import heapq
-from collections.abc import Iterable
+import os
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from queue import SimpleQueue
+from typing import Any, TypeVar
 
 import numpy as np
 import scipy.sparse as sp
@@ -23,6 +26,7 @@ from ffr_prep.solvers.multifrontal import (
     DONE,
     Fronts,
     Sorted,
+    Workspace,
     add,
     backward,
     begin,
@@ -37,6 +41,7 @@ from ffr_prep.solvers.multifrontal import (
     pack,
     row_tile,
     shape,
+    taken,
     triangle,
     update_tile,
 )
@@ -44,6 +49,8 @@ from ffr_prep.solvers.nested_dissection import NOTHING, elimination_tree
 from ffr_prep.solvers.threads import Map, threads
 
 _BRANCHES = 24  # a branch has at most this part of the work
+Made = TypeVar("Made")
+
 _TILE = 384
 LESS = (
     "take a coarser mesh, cut the body into parts, or reduce it where there is more memory, on several machines with the "
@@ -63,6 +70,11 @@ class Division:
     branches: Array
     trunk: list[int]
     below: list[list[int]]
+
+    @property
+    def in_trunk(self) -> Array:
+        """(p, 2) the fronts of the trunk as runs of their own."""
+        return np.repeat(self.trunk, 2).reshape(-1, 2).astype(int)
 
 
 @dataclass(frozen=True)
@@ -119,8 +131,10 @@ def cholesky(A: sp.csr_array, positions: Array, advance: Advance = no_advance, h
 def solve_cholesky(factor: Factor, b: Array) -> Array:
     """A^-1 b for b (n, r)."""
     fronts, targets = factor.fronts, factor.targets
-    y = np.zeros((factor.rows, b.shape[1]))
-    y[: len(factor.order)] = b[factor.order]
+    n = len(factor.order)
+    y = np.empty((factor.rows, b.shape[1]))
+    np.take(b, factor.order, axis=0, out=y[:n], mode="clip")  # which needs no copy
+    y[n:] = 0.0
 
     def back(run: Run) -> None:
         y[run.at : run.at + len(run.copied)] = y[run.copied]
@@ -134,7 +148,7 @@ def solve_cholesky(factor: Factor, b: Array) -> Array:
         for stage in reversed(factor.stages):
             finish(each(back, stage))
     x = np.zeros(b.shape)
-    x[factor.order] = y[: len(factor.order)]
+    x[factor.order] = y[:n]
     return x
 
 
@@ -210,17 +224,15 @@ def _stages(fronts: Fronts, division: Division) -> tuple[list[list[Run]], Array,
 
 
 def waiting(analysis: Analysis) -> int:
-    """Bytes of fronts at work and of updates that wait for theirs, at most: of two branches at work, and of all at their
-    ends."""
+    """Bytes of fronts at work and of updates that wait for theirs, at most."""
     fronts, division = analysis.fronts, analysis.division
     triangles = triangle(np.diff(fronts.ends))
-    pending, places = np.empty(len(triangles) + 1, np.int64), np.zeros(len(triangles) + 2, np.int64)
-    inside = [most_waiting(fronts, *branch, pending, places) + sum(largest(fronts, *branch)) for branch in division.branches]
     height = most = int(sum(triangles[last] for _, last in division.branches))
     for k in division.trunk:
-        most = max(most, height + int(triangles[k]) + sum(largest(fronts, k, k)))
+        most = max(most, height + int(triangles[k]))
         height += int(triangles[k] - triangles[division.below[k]].sum())
-    return 8 * (most + int(sum(sorted(inside)[-2:])))
+    in_branches, in_trunk = _at_work(division) * sum(_most(fronts, division.branches)), _most(fronts, division.in_trunk)
+    return 8 * (most + max(in_branches, sum(in_trunk)))
 
 
 @dataclass
@@ -245,27 +257,72 @@ def progress_of(analysis: Analysis, advance: Advance) -> Elimination:
 
 
 def _eliminate_all(fronts: Fronts, division: Division, matrix: Sorted, each: Map, elimination: Elimination) -> None:
-    results = each(lambda branch: eliminate_branch(fronts, branch[0], branch[1], matrix), division.branches)
-    updates: dict[int, Array] = {}
-    for (first, last), (update, bad) in zip(division.branches, results, strict=True):
-        _check_pivot(bad)
-        updates[int(last)] = update
-        elimination.add(int(first), int(last))
-    local = np.empty(len(matrix.order), np.int32)
+    updates = _eliminate_branches(fronts, division, matrix, each, elimination)
+    space = workspace(fronts, division.in_trunk, len(matrix.place))
     for k in division.trunk:
-        panel, update = begun(fronts, k, matrix, local)
+        panel, update = begun(fronts, k, matrix, space)
         for child in division.below[k]:
-            add_tiled(fronts, child, updates.pop(child), panel, update, local, each)
+            add_tiled(fronts, child, updates.pop(child), panel, update, space.local, each)
         _eliminate_tiled(fronts, k, panel, update, each)
         updates[k] = packed(update)
         elimination.add(k, k)
 
 
-def begun(fronts: Fronts, k: int, matrix: Sorted, local: Array) -> tuple[Array, Array]:
-    """The panel and the update of a front, with the matrix in them."""
-    own, rest = shape(fronts, k)
-    panel, update = np.empty((own, own + rest)), np.empty((rest, rest))
-    begin(fronts, k, panel, matrix, update, local)
+def _eliminate_branches(
+    fronts: Fronts, division: Division, matrix: Sorted, each: Map, elimination: Elimination
+) -> dict[int, Array]:
+    """The updates of the last fronts of all branches."""
+    spaces = workspaces(fronts, division, len(matrix.place))
+    results = each(lambda branch: in_turn(spaces, eliminate_branch, fronts, *branch, matrix), division.branches)
+    updates: dict[int, Array] = {}
+    for (first, last), (update, bad) in zip(division.branches, results, strict=True):
+        _check_pivot(bad)
+        updates[int(last)] = update
+        elimination.add(int(first), int(last))
+    return updates
+
+
+# ---- workspaces, used again and again as fresh memory takes longer than filling it ---------------------------------
+
+
+def workspace(fronts: Fronts, runs: Array, unknowns: int) -> Workspace:
+    """What the elimination of any of the runs (t, 2), first and last front, needs."""
+    return Workspace(*map(np.empty, _most(fronts, runs)), np.empty(unknowns, np.int32))
+
+
+def workspaces(fronts: Fronts, division: Division, unknowns: int) -> SimpleQueue[Workspace]:
+    """One for each thread, for all branches."""
+    spaces: SimpleQueue[Workspace] = SimpleQueue()
+    for _ in range(_at_work(division)):
+        spaces.put(workspace(fronts, division.branches, unknowns))
+    return spaces
+
+
+def _at_work(division: Division) -> int:
+    """How many branches are at work at a time."""
+    return min(os.cpu_count() or 1, len(division.branches))
+
+
+def _most(fronts: Fronts, runs: Array) -> list[int]:
+    """Numbers of the largest panel, of the largest update, and of the updates that wait at a time, of all runs (t, 2)."""
+    pending, places = np.empty(len(fronts.children) + 1, np.int64), np.zeros(len(fronts.children) + 2, np.int64)
+    sizes = [(*largest(fronts, *run), most_waiting(fronts, *run, pending, places)) for run in runs]
+    return [max(of_all, default=0) for of_all in zip(*sizes, strict=True)] or [0, 0, 0]
+
+
+def in_turn(spaces: SimpleQueue[Workspace], work: Callable[..., Made], *args: Any) -> Made:
+    """What the work makes of the arguments and a workspace, which it gives back."""
+    space = spaces.get()
+    try:
+        return work(*args, space)
+    finally:
+        spaces.put(space)
+
+
+def begun(fronts: Fronts, k: int, matrix: Sorted, space: Workspace) -> tuple[Array, Array]:
+    """The panel and the update of a front, with the matrix in them, in the workspace."""
+    panel, update = taken(fronts, k, space)
+    begin(fronts, k, panel, matrix, update, space.local)
     return panel, update
 
 

@@ -32,7 +32,7 @@ from ffr_prep.solvers.inertia import modes_below
 from ffr_prep.solvers.lanczos import lowest_modes
 from ffr_prep.solvers.nested_dissection import NOTHING
 from ffr_prep.solvers.slepc import SlepcProcess, mpi_count, mpi_modes, mpi_solve, pencil, started
-from ffr_prep.solvers.threads import product_of_sizes
+from ffr_prep.solvers.threads import pieces, product_of_sizes
 from ffr_prep.solvers.verification import Verification, verified
 
 Solve = Callable[[Array], Array]
@@ -302,7 +302,9 @@ def solve_supported(problem: SupportedBody, f: Array, c: Array) -> tuple[Array, 
     right = np.vstack([c - problem.C @ particular, problem.body.T.T @ f])
     solution = scipy.linalg.lu_solve(problem.bordered, problem.scale[:, None] * right) * problem.scale[:, None]
     mu, alpha = solution[: len(c)], solution[len(c) :]
-    return particular - problem.flexibility @ mu + problem.body.T @ alpha, mu
+    for part in pieces(len(particular)):  # in place, as fresh memory takes longer than filling it
+        particular[part] += problem.body.T[part] @ alpha - problem.flexibility[part] @ mu
+    return particular, mu
 
 
 def solve_refined(problem: SupportedBody, f: Array, c: Array) -> tuple[Array, Array]:

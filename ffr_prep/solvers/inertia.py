@@ -25,7 +25,21 @@ from ffr_prep.common.arrays import Array
 from ffr_prep.common.compile_cache import check_compiled_code
 from ffr_prep.common.process_memory import check_memory
 from ffr_prep.common.progress import Advance, no_advance
-from ffr_prep.solvers.cholesky import LESS, Analysis, add_tiled, analysed, begun, finish, packed, progress_of, tiles, waiting
+from ffr_prep.solvers.cholesky import (
+    LESS,
+    Analysis,
+    add_tiled,
+    analysed,
+    begun,
+    finish,
+    in_turn,
+    packed,
+    progress_of,
+    tiles,
+    waiting,
+    workspace,
+    workspaces,
+)
 from ffr_prep.solvers.multifrontal import (
     INTEGERS,
     LETTERS,
@@ -34,16 +48,16 @@ from ffr_prep.solvers.multifrontal import (
     REALS,
     RIGHT,
     TRANSPOSED,
+    Workspace,
     add,
     begin,
     divide,
     external,
-    largest,
-    most_waiting,
     pack,
     product,
     pushed,
     shape,
+    taken,
 )
 from ffr_prep.solvers.threads import Map, threads
 
@@ -80,14 +94,15 @@ def negative_eigenvalues(A: sp.csr_array, positions: Array, advance: Advance = n
     check_memory(waiting(analysis), f"the count of modes of {len(matrix.order)} unknowns", LESS)
     elimination, updates, total = progress_of(analysis, advance), {}, 0
     with threads() as each:
-        found = each(lambda branch: _count_branch(fronts, branch[0], branch[1], matrix), division.branches)
+        spaces = workspaces(fronts, division, len(matrix.place))
+        found = each(lambda branch: in_turn(spaces, _count_branch, fronts, *branch, matrix), division.branches)
         for (first, last), (update, count) in zip(division.branches, found, strict=True):
             total += _checked(count)
             updates[int(last)] = update
             elimination.add(int(first), int(last))
-        local = np.empty(len(matrix.order), np.int32)
+        space = workspace(fronts, division.in_trunk, len(matrix.place))
         for k in division.trunk:
-            updates[k], count = _count_tiled(analysis, k, updates, local, each)
+            updates[k], count = _count_tiled(analysis, k, updates, space, each)
             total += _checked(count)
             elimination.add(k, k)
     return total
@@ -99,12 +114,14 @@ def _checked(count: int) -> int:
     return count
 
 
-def _count_tiled(analysis: Analysis, k: int, updates: dict[int, Array], local: Array, each: Map) -> tuple[Array, int]:
+def _count_tiled(
+    analysis: Analysis, k: int, updates: dict[int, Array], space: Workspace, each: Map
+) -> tuple[Array, int]:
     """The update of a large front and its negative pivots, on all threads by tiles that do not depend on their number."""
     own, rest = shape(analysis.fronts, k)
-    panel, update = begun(analysis.fronts, k, analysis.matrix, local)
+    panel, update = begun(analysis.fronts, k, analysis.matrix, space)
     for child in analysis.division.below[k]:
-        add_tiled(analysis.fronts, child, updates.pop(child), panel, update, local, each)
+        add_tiled(analysis.fronts, child, updates.pop(child), panel, update, space.local, each)
     count, pivots, d, e = _split(panel)
     scaled = np.empty((own, rest))
     if count != _SINGULAR:
@@ -118,19 +135,14 @@ def _count_tiled(analysis: Analysis, k: int, updates: dict[int, Array], local: A
 
 
 @numba.njit(cache=True, nogil=True)
-def _count_branch(fronts, first, last, A):  # type: ignore[no-untyped-def]
+def _count_branch(fronts, first, last, A, space):  # type: ignore[no-untyped-def]
     """As `eliminate_branch`, by L D L^T and without keeping the panels: the update of the last front, negative pivots."""
-    local = np.empty(A.place.size, np.int32)
+    waiting, local = space.waiting, space.local
     pending = np.empty(last - first + 1, np.int64)
     places = np.zeros(last - first + 2, np.int64)
-    waiting = np.empty(most_waiting(fronts, first, last, pending, places))
-    panels, updates = largest(fronts, first, last)
-    panel_space, update_space = np.empty(panels), np.empty(updates)
     height, total = 0, 0
     for k in range(first, last + 1):
-        own, rest = shape(fronts, k)
-        panel = panel_space[: own * (own + rest)].reshape((own, own + rest))
-        update = update_space[: rest**2].reshape((rest, rest))
+        panel, update = taken(fronts, k, space)
         begin(fronts, k, panel, A, update, local)
         for h in range(height - fronts.children[k], height):
             of_child = waiting[places[h] : places[h + 1]]

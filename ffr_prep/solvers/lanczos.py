@@ -91,31 +91,40 @@ def _orthonormal(vectors: Array, Q: SearchSpace, M: sp.csr_array, coupled: int) 
     But for rounding the vectors are coupled to those of Q from the number `coupled` on alone. These parts are taken out
     first; then nothing large is left that a single pass over all of Q would have to take out.
     """
+    vectors, momenta = np.array(vectors), np.empty(vectors.shape)
     with threads() as each:
         coordinates = np.zeros((Q.size, vectors.shape[1]))
         for first in (coupled, 0):
-            momenta = sparse_product(M, vectors, each)
+            sparse_product(M, vectors, each, momenta)
             if first == coupled:
                 smallest = _DEPENDENT**2 * np.einsum("zi,zi->i", vectors, momenta).max(initial=0.0)
-            parts = _coordinates(Q, momenta, each, first)
-            vectors = _removed(vectors, Q, parts, each)
-            coordinates += parts
-        vectors, momenta, amplified = _normalised(vectors, M, smallest, each)
+            coordinates += _taken_out(vectors, Q, momenta, each, first)
+        vectors, momenta, amplified = _normalised(vectors, M, smallest, each, momenta)
         if amplified:
-            vectors = _removed(vectors, Q, _coordinates(Q, momenta, each, 0), each)
-        vectors, momenta, _ = _normalised(vectors, M, 0.5, each)
+            _taken_out(vectors, Q, momenta, each, 0)
+        vectors, momenta, _ = _normalised(vectors, M, 0.5, each, momenta)
     return vectors, momenta, coordinates
 
 
-def _normalised(vectors: Array, M: sp.csr_array, smallest: float, each: Map) -> tuple[Array, Array, bool]:
+def _normalised(
+    vectors: Array, M: sp.csr_array, smallest: float, each: Map, momenta: Array
+) -> tuple[Array, Array, bool]:
     """M-orthonormal basis of the vectors without directions of a smaller squared norm, M times it, and whether some are so
-    small that their rounding is large."""
-    momenta = sparse_product(M, vectors, each)
+    small that their rounding is large. It is in the memory of the vectors and of their momenta: fresh memory takes longer
+    than filling it."""
+    sparse_product(M, vectors, each, momenta)
     squares, axes = scipy.linalg.eigh(vectors.T @ momenta)
     kept = squares > smallest
     combination = axes[:, kept] / np.sqrt(squares[kept])
     amplified = bool((squares[kept] < _AMPLIFIED**2 * squares.max(initial=0.0)).any())
-    return vectors @ combination, momenta @ combination, amplified
+    return _turned(vectors, combination), _turned(momenta, combination), amplified
+
+
+def _turned(vectors: Array, combination: Array) -> Array:
+    """(Z, k) vectors (Z, b) times a combination (b, k), in their memory if k = b."""
+    for part in pieces(len(vectors)):
+        vectors[part, : combination.shape[1]] = vectors[part] @ combination
+    return np.ascontiguousarray(vectors[:, : combination.shape[1]])
 
 
 # ---- the search space: rows of panels, which make large products of matrices --------------------------------------
@@ -158,18 +167,17 @@ def _coordinates(Q: SearchSpace, momenta: Array, each: Map, first: int) -> Array
     return np.sum(list(each(of_rows, pieces(len(momenta)))), axis=0)
 
 
-def _removed(vectors: Array, Q: SearchSpace, coordinates: Array, each: Map) -> Array:
-    """(Z, b) vectors - Q coordinates."""
-    left = np.array(vectors)
-    involved = np.flatnonzero(coordinates.any(axis=1))
+def _taken_out(vectors: Array, Q: SearchSpace, momenta: Array, each: Map, first: int) -> Array:
+    """(p, b) Q^T momenta, of which Q from the vector `first` on is subtracted from the vectors (Z, b)."""
+    coordinates = _coordinates(Q, momenta, each, first)
 
     def from_rows(part: slice) -> None:
-        for numbers, rows in Q.used(int(involved[0]) if involved.size else Q.size):
-            left[part] -= rows[:, part].T @ coordinates[numbers]
+        for numbers, rows in Q.used(first):
+            vectors[part] -= rows[:, part].T @ coordinates[numbers]
 
     for _ in each(from_rows, pieces(len(vectors))):
         pass
-    return left
+    return coordinates
 
 
 def _combined(Q: SearchSpace, coordinates: Array) -> Array:

@@ -62,6 +62,15 @@ class Sorted(NamedTuple):
     place: Array
 
 
+class Workspace(NamedTuple):
+    """Memory for a front at work, its panel and its update, for the updates that wait, and (n,) for places."""
+
+    panel: Array
+    update: Array
+    waiting: Array
+    local: Array
+
+
 # ---- BLAS and LAPACK ----------------------------------------------------------------------------------------------
 
 
@@ -264,22 +273,14 @@ def eliminate(fronts, k, panel, update):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True)
-def eliminate_branch(fronts, first, last, A):  # type: ignore[no-untyped-def]
-    """Eliminate the fronts first...last, a front and all below it: the update of the last, and a bad pivot or DONE.
-
-    The updates that wait for their front are in one array, as asking for memory takes longer than filling it.
-    """
-    local = np.empty(A.place.size, np.int32)
+def eliminate_branch(fronts, first, last, A, space):  # type: ignore[no-untyped-def]
+    """Eliminate the fronts first...last, a front and all below it: the update of the last, and a bad pivot or DONE."""
+    waiting, local = space.waiting, space.local
     pending = np.empty(last - first + 1, np.int64)
     places = np.zeros(last - first + 2, np.int64)
-    waiting = np.empty(most_waiting(fronts, first, last, pending, places))
-    panels, updates = largest(fronts, first, last)
-    panel_space, update_space = np.empty(panels), np.empty(updates)
     height = 0
     for k in range(first, last + 1):
-        own, rest = shape(fronts, k)
-        panel = panel_space[: own * (own + rest)].reshape((own, own + rest))
-        update = update_space[: rest**2].reshape((rest, rest))
+        panel, update = taken(fronts, k, space)
         begin(fronts, k, panel, A, update, local)
         for h in range(height - fronts.children[k], height):
             of_child = waiting[places[h] : places[h + 1]]
@@ -290,6 +291,14 @@ def eliminate_branch(fronts, first, last, A):  # type: ignore[no-untyped-def]
         height = pushed(fronts, k, pending, places, height)
         pack(update, waiting[places[height - 1] : places[height]])
     return waiting[: places[height]].copy(), bad
+
+
+@numba.njit(cache=True, nogil=True)
+def taken(fronts, k, space):  # type: ignore[no-untyped-def]
+    """The panel (own, own + rest) and the update (rest, rest) of a front, of the workspace."""
+    own, rest = shape(fronts, k)
+    panel = space.panel[: own * (own + rest)].reshape((own, own + rest))
+    return panel, space.update[: rest**2].reshape((rest, rest))
 
 
 @numba.njit(cache=True, nogil=True)
@@ -414,7 +423,9 @@ def backward(fronts, targets, first, last, y):  # type: ignore[no-untyped-def]
             at -= (b - a) * (size - a)
             strip = fronts.panels[at : at + (b - a) * (size - a)]
             if b < size:
-                product(TRANSPOSED, PLAIN, strip[b - a :], x[b:], x[a:], b - a, r, size - b, (size - a, size, size), -1.0)
+                product(
+                    TRANSPOSED, PLAIN, strip[b - a :], x[b:], x[a:], b - a, r, size - b, (size - a, size, size), -1.0
+                )
             divide(LEFT, True, strip, x[a:], b - a, r, size - a, size)
         for i in range(own):
             for c in range(r):

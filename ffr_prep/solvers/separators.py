@@ -152,7 +152,9 @@ def _augment(ends, near, start, stop, before, after, back):  # type: ignore[no-u
     choices = np.empty(2 * start.size + 1, np.int32)
     sent = False
     for first in range(start.size):
-        height = 0 if start[first] and before[first] != _END and back[first, _OUT] >= 0 and not tried[first, _IN] else -1
+        height = (
+            0 if start[first] and before[first] != _END and back[first, _OUT] >= 0 and not tried[first, _IN] else -1
+        )
         way[0] = first, _IN
         choices[0] = 0
         while height >= 0:
