@@ -54,7 +54,7 @@ def left() -> int | None:
 
 
 def give_back() -> None:
-    """Give back to the system what was freed in small pieces, where the C library can (glibc): large arrays never lie there."""
+    """What was freed in small pieces goes back to the system, where the C library can (glibc): large arrays never use it."""
     with contextlib.suppress(OSError, AttributeError, TypeError):
         ctypes.CDLL(None).malloc_trim(0)
 

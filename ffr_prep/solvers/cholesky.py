@@ -14,7 +14,7 @@ import os
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from queue import SimpleQueue
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 import scipy.sparse as sp
@@ -118,23 +118,30 @@ def cholesky(A: sp.csr_array, positions: Array, advance: Advance = no_advance, h
     Raises numpy.linalg.LinAlgError when A is not positive definite, InputError when the machine has too little memory.
     """
     analysis = analysed(A, positions, held)
-    matrix, division = analysis.matrix, analysis.division
-    factor = 8 * int(analysis.fronts.offsets[-1])
-    check_memory(factor + waiting(analysis), f"factorising the stiffness of {len(matrix.order)} unknowns", LESS)
+    order, division, factor = analysis.matrix.order, analysis.division, 8 * int(analysis.fronts.offsets[-1])
+    check_memory(factor + waiting(analysis), f"factorising the stiffness of {len(order)} unknowns", LESS)
     advance(0.0, f"the factor takes {in_words(factor)}")
     fronts = analysis.fronts._replace(panels=np.empty(analysis.fronts.offsets[-1]))
     with threads() as each:
-        _eliminate_all(fronts, division, matrix, each, progress_of(analysis, advance))
-    return Factor(matrix.order, fronts, division, *_stages(fronts, division))
+        _eliminate_all(fronts, division, analysis.matrix, each, progress_of(analysis, advance))
+    return Factor(order, fronts, division, *_stages(fronts, division))
 
 
 def solve_cholesky(factor: Factor, b: Array) -> Array:
     """A^-1 b for b (n, r)."""
-    fronts, targets = factor.fronts, factor.targets
     n = len(factor.order)
     y = np.empty((factor.rows, b.shape[1]))
     np.take(b, factor.order, axis=0, out=y[:n], mode="clip")  # which needs no copy
     y[n:] = 0.0
+    _swept(factor, y)
+    x = np.zeros(b.shape)
+    x[factor.order] = y[:n]
+    return x
+
+
+def _swept(factor: Factor, y: Array) -> None:
+    """(L L^T)^-1 of the rows y of a solution, in place."""
+    fronts, targets = factor.fronts, factor.targets
 
     def back(run: Run) -> None:
         y[run.at : run.at + len(run.copied)] = y[run.copied]
@@ -147,9 +154,6 @@ def solve_cholesky(factor: Factor, b: Array) -> Array:
                 y[run.copied] += y[run.at : run.at + len(run.copied)]
         for stage in reversed(factor.stages):
             finish(each(back, stage))
-    x = np.zeros(b.shape)
-    x[factor.order] = y[:n]
-    return x
 
 
 # ---- division of the work -----------------------------------------------------------------------------------------
@@ -272,8 +276,7 @@ def _eliminate_branches(
     fronts: Fronts, division: Division, matrix: Sorted, each: Map, elimination: Elimination
 ) -> dict[int, Array]:
     """The updates of the last fronts of all branches."""
-    spaces = workspaces(fronts, division, len(matrix.place))
-    results = each(lambda branch: in_turn(spaces, eliminate_branch, fronts, *branch, matrix), division.branches)
+    results = on_branches(eliminate_branch, fronts, division, matrix, each)
     updates: dict[int, Array] = {}
     for (first, last), (update, bad) in zip(division.branches, results, strict=True):
         _check_pivot(bad)
@@ -290,12 +293,22 @@ def workspace(fronts: Fronts, runs: Array, unknowns: int) -> Workspace:
     return Workspace(*map(np.empty, _most(fronts, runs)), np.empty(unknowns, np.int32))
 
 
-def workspaces(fronts: Fronts, division: Division, unknowns: int) -> SimpleQueue[Workspace]:
-    """One for each thread, for all branches."""
+def on_branches(
+    work: Callable[..., Made], fronts: Fronts, division: Division, matrix: Sorted, each: Map
+) -> Iterable[Made]:
+    """What the work makes of each branch in a workspace, of which there is one for each thread."""
     spaces: SimpleQueue[Workspace] = SimpleQueue()
     for _ in range(_at_work(division)):
-        spaces.put(workspace(fronts, division.branches, unknowns))
-    return spaces
+        spaces.put(workspace(fronts, division.branches, len(matrix.place)))
+
+    def in_turn(branch: Array) -> Made:
+        space = spaces.get()
+        try:
+            return work(fronts, branch[0], branch[1], matrix, space)
+        finally:
+            spaces.put(space)
+
+    return each(in_turn, division.branches)
 
 
 def _at_work(division: Division) -> int:
@@ -308,15 +321,6 @@ def _most(fronts: Fronts, runs: Array) -> list[int]:
     pending, places = np.empty(len(fronts.children) + 1, np.int64), np.zeros(len(fronts.children) + 2, np.int64)
     sizes = [(*largest(fronts, *run), most_waiting(fronts, *run, pending, places)) for run in runs]
     return [max(of_all, default=0) for of_all in zip(*sizes, strict=True)] or [0, 0, 0]
-
-
-def in_turn(spaces: SimpleQueue[Workspace], work: Callable[..., Made], *args: Any) -> Made:
-    """What the work makes of the arguments and a workspace, which it gives back."""
-    space = spaces.get()
-    try:
-        return work(*args, space)
-    finally:
-        spaces.put(space)
 
 
 def begun(fronts: Fronts, k: int, matrix: Sorted, space: Workspace) -> tuple[Array, Array]:

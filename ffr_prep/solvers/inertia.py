@@ -32,13 +32,12 @@ from ffr_prep.solvers.cholesky import (
     analysed,
     begun,
     finish,
-    in_turn,
+    on_branches,
     packed,
     progress_of,
     tiles,
     waiting,
     workspace,
-    workspaces,
 )
 from ffr_prep.solvers.multifrontal import (
     INTEGERS,
@@ -94,8 +93,7 @@ def negative_eigenvalues(A: sp.csr_array, positions: Array, advance: Advance = n
     check_memory(waiting(analysis), f"the count of modes of {len(matrix.order)} unknowns", LESS)
     elimination, updates, total = progress_of(analysis, advance), {}, 0
     with threads() as each:
-        spaces = workspaces(fronts, division, len(matrix.place))
-        found = each(lambda branch: in_turn(spaces, _count_branch, fronts, *branch, matrix), division.branches)
+        found = on_branches(_count_branch, fronts, division, matrix, each)
         for (first, last), (update, count) in zip(division.branches, found, strict=True):
             total += _checked(count)
             updates[int(last)] = update

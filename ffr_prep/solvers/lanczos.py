@@ -93,12 +93,10 @@ def _orthonormal(vectors: Array, Q: SearchSpace, M: sp.csr_array, coupled: int) 
     """
     vectors, momenta = np.array(vectors), np.empty(vectors.shape)
     with threads() as each:
-        coordinates = np.zeros((Q.size, vectors.shape[1]))
-        for first in (coupled, 0):
-            sparse_product(M, vectors, each, momenta)
-            if first == coupled:
-                smallest = _DEPENDENT**2 * np.einsum("zi,zi->i", vectors, momenta).max(initial=0.0)
-            coordinates += _taken_out(vectors, Q, momenta, each, first)
+        sparse_product(M, vectors, each, momenta)
+        smallest = _DEPENDENT**2 * np.einsum("zi,zi->i", vectors, momenta).max(initial=0.0)
+        coordinates = _taken_out(vectors, Q, momenta, each, coupled)
+        coordinates += _taken_out(vectors, Q, sparse_product(M, vectors, each, momenta), each, 0)
         vectors, momenta, amplified = _normalised(vectors, M, smallest, each, momenta)
         if amplified:
             _taken_out(vectors, Q, momenta, each, 0)

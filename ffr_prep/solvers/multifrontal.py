@@ -376,60 +376,62 @@ def update_tile(panel, own, update, first, last, top, bottom):  # type: ignore[n
 @numba.njit(cache=True, nogil=True)
 def forward(fronts, targets, first, last, y):  # type: ignore[no-untyped-def]
     """L^-1 for the fronts first...last; y (rows, r), `targets` the rows of the boundaries."""
-    r = y.shape[1]
-    space = np.empty(r * tallest(fronts, first, last))
+    space = np.empty(y.shape[1] * tallest(fronts, first, last))
     for k in range(first, last + 1):
         own, rest = shape(fronts, k)
-        start, size, at = fronts.starts[k], own + rest, fronts.offsets[k]
-        x = space[: r * size]
-        for c in range(r):
-            for i in range(own):
-                x[c * size + i] = y[start + i, c]
-            x[c * size + own : (c + 1) * size] = 0.0
-        for a in range(0, own, STRIP):
-            b = min(a + STRIP, own)
-            strip = fronts.panels[at : at + (b - a) * (size - a)]
-            divide(LEFT, False, strip, x[a:], b - a, r, size - a, size)
-            if b < size:
-                product(PLAIN, PLAIN, strip[b - a :], x[a:], x[b:], size - b, r, b - a, (size - a, size, size), -1.0)
-            at += strip.size
+        x = space[: y.shape[1] * (own + rest)].reshape((y.shape[1], own + rest))
+        x[:, own:] = 0.0
+        x[:, :own] = y[fronts.starts[k] : fronts.starts[k + 1]].T
+        _down(fronts.panels[fronts.offsets[k] : fronts.offsets[k + 1]], own, x)
+        y[fronts.starts[k] : fronts.starts[k + 1]] = x[:, :own].T
         rows = targets[fronts.ends[k] : fronts.ends[k + 1]]
-        for i in range(own):
-            for c in range(r):
-                y[start + i, c] = x[c * size + i]
         for i in range(rest):
-            for c in range(r):
-                y[rows[i], c] += x[c * size + own + i]
+            for c in range(y.shape[1]):
+                y[rows[i], c] += x[c, own + i]
+
+
+@numba.njit(cache=True, nogil=True)
+def _down(panel, own, x):  # type: ignore[no-untyped-def]
+    """L^-1 of the own part of x (r, own + rest), and what that takes from the rest; panel : strips of a front."""
+    r, size = x.shape
+    flat, at = x.reshape(x.size), 0
+    for a in range(0, own, STRIP):
+        b = min(a + STRIP, own)
+        divide(LEFT, False, panel[at:], flat[a:], b - a, r, size - a, size)
+        if b < size:
+            below, sizes = panel[at + b - a :], (size - a, size, size)
+            product(PLAIN, PLAIN, below, flat[a:], flat[b:], size - b, r, b - a, sizes, -1.0)
+        at += (b - a) * (size - a)
 
 
 @numba.njit(cache=True, nogil=True)
 def backward(fronts, targets, first, last, y):  # type: ignore[no-untyped-def]
     """L^-T for the fronts first...last, the last first."""
-    r = y.shape[1]
-    space = np.empty(r * tallest(fronts, first, last))
+    space = np.empty(y.shape[1] * tallest(fronts, first, last))
     for k in range(last, first - 1, -1):
         own, rest = shape(fronts, k)
-        start, size, at = fronts.starts[k], own + rest, fronts.offsets[k + 1]
-        x = space[: r * size]
+        x = space[: y.shape[1] * (own + rest)].reshape((y.shape[1], own + rest))
+        x[:, :own] = y[fronts.starts[k] : fronts.starts[k + 1]].T
         rows = targets[fronts.ends[k] : fronts.ends[k + 1]]
-        for i in range(own):
-            for c in range(r):
-                x[c * size + i] = y[start + i, c]
         for i in range(rest):
-            for c in range(r):
-                x[c * size + own + i] = y[rows[i], c]
-        for a in range(own - 1 - (own - 1) % STRIP, -1, -STRIP):
-            b = min(a + STRIP, own)
-            at -= (b - a) * (size - a)
-            strip = fronts.panels[at : at + (b - a) * (size - a)]
-            if b < size:
-                product(
-                    TRANSPOSED, PLAIN, strip[b - a :], x[b:], x[a:], b - a, r, size - b, (size - a, size, size), -1.0
-                )
-            divide(LEFT, True, strip, x[a:], b - a, r, size - a, size)
-        for i in range(own):
-            for c in range(r):
-                y[start + i, c] = x[c * size + i]
+            for c in range(y.shape[1]):
+                x[c, own + i] = y[rows[i], c]
+        _up(fronts.panels[fronts.offsets[k] : fronts.offsets[k + 1]], own, x)
+        y[fronts.starts[k] : fronts.starts[k + 1]] = x[:, :own].T
+
+
+@numba.njit(cache=True, nogil=True)
+def _up(panel, own, x):  # type: ignore[no-untyped-def]
+    """L^-T of the own part of x (r, own + rest), whose rest is known; panel : strips of a front."""
+    r, size = x.shape
+    flat, at = x.reshape(x.size), panel.size
+    for a in range(own - 1 - (own - 1) % STRIP, -1, -STRIP):
+        b = min(a + STRIP, own)
+        at -= (b - a) * (size - a)
+        if b < size:
+            below, sizes = panel[at + b - a :], (size - a, size, size)
+            product(TRANSPOSED, PLAIN, below, flat[b:], flat[a:], b - a, r, size - b, sizes, -1.0)
+        divide(LEFT, True, panel[at:], flat[a:], b - a, r, size - a, size)
 
 
 @numba.njit(cache=True, nogil=True)

@@ -37,11 +37,9 @@ def separated(
     touching = below[_touching(indptr, indices, below, place)]
     band = np.sort(np.concatenate([touching, ordered[low:high]]))
     place[band] = np.arange(band.size)
-    ends, near, start, stop = _within(indptr, indices, band, place)
-    start[place[touching]] = True
+    start, stop, steps, back = _reached(indptr, indices, band, place, touching)
     below = below[place[below] == _BELOW]
     place[ordered] = _NONE
-    steps, back = _reached(ends, near, start, stop)
     first, other = _parts(below, band, above, start, steps), _parts(above, band, below, stop, back)
     return min(first, (other[1], other[0], other[2]), key=lambda parts: abs(len(parts[0]) - len(parts[1])))
 
@@ -72,34 +70,33 @@ def _touching(indptr, indices, below, place):  # type: ignore[no-untyped-def]
 @numba.njit(cache=True)
 def _within(indptr, indices, band, place):  # type: ignore[no-untyped-def]
     """Neighbours of the points of the band within it, as of a sparse matrix, and which touch points below and above."""
-    size = band.size
-    ends = np.zeros(size + 1, np.int32)
-    start, stop = np.zeros(size, np.bool_), np.zeros(size, np.bool_)
-    for fill in range(2):
-        near = np.empty(ends[size] if fill else 0, np.int32)
-        count = 0
-        for i in range(size):
-            for e in range(indptr[band[i]], indptr[band[i] + 1]):
-                p = place[indices[e]]
-                start[i] |= p == _BELOW
-                stop[i] |= p == _ABOVE
-                if p >= 0 and p != i:
-                    if fill:
-                        near[count] = p
-                    count += 1
-            ends[i + 1] = count
+    ends = np.zeros(band.size + 1, np.int32)
+    near = np.empty(np.sum(indptr[band + 1] - indptr[band]), np.int32)
+    start, stop = np.zeros(band.size, np.bool_), np.zeros(band.size, np.bool_)
+    for i in range(band.size):
+        ends[i + 1] = ends[i]
+        for e in range(indptr[band[i]], indptr[band[i] + 1]):
+            p = place[indices[e]]
+            start[i] |= p == _BELOW
+            stop[i] |= p == _ABOVE
+            if p >= 0 and p != i:
+                near[ends[i + 1]] = p
+                ends[i + 1] += 1
     return ends, near, start, stop
 
 
 @numba.njit(cache=True)
-def _reached(ends, near, start, stop):  # type: ignore[no-untyped-def]
-    """(m, 2) steps in the residual graph of a largest flow from the start, and backwards from the stop."""
+def _reached(indptr, indices, band, place, touching):  # type: ignore[no-untyped-def]
+    """(m,) which points of the band are at the start, next to points below, and at the stop, next to points above; (m, 2)
+    steps in the residual graph of a largest flow from the start, and backwards from the stop."""
+    ends, near, start, stop = _within(indptr, indices, band, place)
+    start[place[touching]] = True
     before, after = np.full(start.size, _NONE, np.int32), np.full(start.size, _NONE, np.int32)
     while True:
         back = _steps(ends, near, stop, start, after, before)
         if not _augment(ends, near, start, stop, before, after, back):
             break
-    return _steps(ends, near, start, stop, before, after), back
+    return start, stop, _steps(ends, near, start, stop, before, after), back
 
 
 @numba.njit(cache=True)
