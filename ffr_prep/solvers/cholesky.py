@@ -290,7 +290,8 @@ def _eliminate_branches(
 
 def workspace(fronts: Fronts, runs: Array, unknowns: int) -> Workspace:
     """What the elimination of any of the runs (t, 2), first and last front, needs."""
-    return Workspace(*map(np.empty, _most(fronts, runs)), np.empty(unknowns, np.int32))
+    panel, update, waiting_updates = map(np.empty, _most(fronts, runs))
+    return Workspace(panel, update, waiting_updates, np.empty(unknowns, np.int32))
 
 
 def on_branches(
@@ -319,7 +320,9 @@ def _at_work(division: Division) -> int:
 def _most(fronts: Fronts, runs: Array) -> list[int]:
     """Numbers of the largest panel, of the largest update, and of the updates that wait at a time, of all runs (t, 2)."""
     pending, places = np.empty(len(fronts.children) + 1, np.int64), np.zeros(len(fronts.children) + 2, np.int64)
-    sizes = [(*largest(fronts, *run), most_waiting(fronts, *run, pending, places)) for run in runs]
+    sizes = [
+        (*largest(fronts, first, last), most_waiting(fronts, first, last, pending, places)) for first, last in runs
+    ]
     return [max(of_all, default=0) for of_all in zip(*sizes, strict=True)] or [0, 0, 0]
 
 

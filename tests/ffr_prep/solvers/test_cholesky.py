@@ -59,6 +59,29 @@ def test_unknowns_without_a_place_come_last():
     assert_solves(bordered, positions)
 
 
+@pytest.mark.parametrize("held", [[0], [3, 70, 71, 200], list(range(40, 60))])
+def test_unknowns_that_are_held_are_zero(held):
+    """And the others are those of the matrix without their rows and columns, which may be singular with them."""
+    A, positions = clamped("tet10", (5, 2, 2))
+    free = np.delete(np.arange(A.shape[0]), held)
+    whole = A.tolil()
+    whole[held, held] = -1.0
+    b = np.random.default_rng(0).normal(size=(A.shape[0], 2))
+    x = solve_cholesky(cholesky(sp.csr_array(whole), positions, held=np.array(held)), b)
+    assert not x[held].any()
+    np.testing.assert_allclose(
+        x[free], np.linalg.solve(A.toarray()[np.ix_(free, free)], b[free]), rtol=0, atol=1e-9 * np.abs(x).max()
+    )
+
+
+def test_a_factor_takes_little_more_than_its_lower_triangle():
+    A, positions = clamped("tet10", (12, 5, 4))
+    fronts = cholesky(A, positions).fronts
+    own, rest = np.diff(fronts.starts), np.diff(fronts.ends)
+    lower = (own * (own + 1) // 2 + own * rest).sum()
+    assert lower < fronts.panels.size < 1.05 * lower
+
+
 def test_graphs_that_fall_apart_when_cut():
     """A star of chains: cutting it leaves parts that do not touch, and cuts without points."""
     rng = np.random.default_rng(2)
@@ -116,7 +139,7 @@ def test_pieces_below_a_piece_precede_it_and_separate_its_halves():
 
 
 def test_the_separator_is_a_smallest_one():
-    """A comb of 20 points on a line, each touching the ten on the other side of the middle: a point of the spine separates."""
+    """A comb of 20 points on a line, each touching the ten on the other side of the middle: one point of the spine parts it."""
     points = np.column_stack([np.arange(20.0), np.zeros((20, 2))])
     edges = sp.lil_array((20, 20))
     for spine, tooth in [(9, k) for k in range(10, 20)] + [(10, k) for k in range(9)]:
