@@ -139,7 +139,7 @@ def test_pieces_below_a_piece_precede_it_and_separate_its_halves():
 
 
 def test_the_separator_is_a_smallest_one():
-    """A comb of 20 points on a line, each touching the ten on the other side of the middle: one point of the spine parts it."""
+    """A comb of 20 points on a line, each touching the ten beyond the middle: one point of the spine parts it."""
     points = np.column_stack([np.arange(20.0), np.zeros((20, 2))])
     edges = sp.lil_array((20, 20))
     for spine, tooth in [(9, k) for k in range(10, 20)] + [(10, k) for k in range(9)]:
