@@ -52,12 +52,13 @@ def lowest_modes(
     Q = SearchSpace([])
     T = np.zeros((0, 0))
     due = count if count > _MANY else 0
-    block, momenta, _ = _orthonormal(flexibility(M @ start), Q, M, 0)
+    block, momenta, _ = _orthonormal(flexibility(M @ start), Q, M, [])
+    last = []
     while True:
-        coupled = max(Q.size - block.shape[1], 0)
+        last = [*last[-1:], momenta]
         _append(Q, block)
         following = flexibility(momenta)
-        block, momenta, columns = _orthonormal(following, Q, M, coupled)
+        block, momenta, columns = _orthonormal(following, Q, M, last)
         T = _bordered(T, columns)
         full = len(T) + block.shape[1] > most or not block.size
         if len(T) < due and not full:
@@ -85,32 +86,35 @@ def _bordered(T: Array, columns: Array) -> Array:
     return np.block([[T, columns[:old]], [columns[:old].T, (corner + corner.T) / 2]])
 
 
-def _orthonormal(vectors: Array, Q: SearchSpace, M: sp.csr_array, coupled: int) -> tuple[Array, Array, Array]:
+def _orthonormal(vectors: Array, Q: SearchSpace, M: sp.csr_array, last: list[Array]) -> tuple[Array, Array, Array]:
     """What the vectors (Z, b) add to Q: an M-orthonormal basis, M times it, and the coordinates Q^T M of the vectors.
 
-    But for rounding the vectors are coupled to those of Q from the number `coupled` on alone. These parts are taken out
-    first; then nothing large is left that a single pass over all of Q would have to take out.
+    But for rounding the vectors are coupled to the last vectors of Q alone, M times which is given in blocks. These parts
+    are taken out first; then nothing large is left that a single pass over all of Q would have to take out.
     """
     vectors, momenta = np.array(vectors), np.empty(vectors.shape)
+    first = Q.size - sum(known.shape[1] for known in last)
     with threads() as each:
-        sparse_product(M, vectors, each, momenta)
-        smallest = _DEPENDENT**2 * np.einsum("zi,zi->i", vectors, momenta).max(initial=0.0)
-        coordinates = _taken_out(vectors, Q, momenta, each, coupled)
-        coordinates += _taken_out(vectors, Q, sparse_product(M, vectors, each, momenta), each, 0)
-        vectors, momenta, amplified = _normalised(vectors, M, smallest, each, momenta)
+        coordinates = np.vstack([np.zeros((first, vectors.shape[1])), *(known.T @ vectors for known in last)])
+        _take_out(vectors, Q, coordinates, each, first)
+        rounding = _coordinates(Q, sparse_product(M, vectors, each, momenta), each)
+        _take_out(vectors, Q, rounding, each, 0)
+        coordinates += rounding
+        size = np.sum(coordinates**2, axis=0) + np.einsum("zi,zi->i", vectors, momenta)
+        vectors, momenta, amplified = _normalised(vectors, momenta, _DEPENDENT**2 * size.max(initial=0.0))
         if amplified:
-            _taken_out(vectors, Q, momenta, each, 0)
-        vectors, momenta, _ = _normalised(vectors, M, 0.5, each, momenta)
+            _take_out(vectors, Q, _coordinates(Q, sparse_product(M, vectors, each, momenta), each), each, 0)
+        vectors, momenta, _ = _normalised(vectors, sparse_product(M, vectors, each, momenta), 0.5)
     return vectors, momenta, coordinates
 
 
-def _normalised(
-    vectors: Array, M: sp.csr_array, smallest: float, each: Map, momenta: Array
-) -> tuple[Array, Array, bool]:
+def _normalised(vectors: Array, momenta: Array, smallest: float) -> tuple[Array, Array, bool]:
     """M-orthonormal basis of the vectors without directions of a smaller squared norm, M times it, and whether some are so
-    small that their rounding is large. It is in the memory of the vectors and of their momenta: fresh memory takes longer
-    than filling it."""
-    sparse_product(M, vectors, each, momenta)
+    small that their rounding is large.
+
+    momenta : M times the vectors; what these were freed of since does no harm, as they have no more of it. Both are
+              overwritten: fresh memory takes longer than filling it.
+    """
     squares, axes = scipy.linalg.eigh(vectors.T @ momenta)
     kept = squares > smallest
     combination = axes[:, kept] / np.sqrt(squares[kept])
@@ -153,21 +157,17 @@ def _append(Q: SearchSpace, block: Array) -> None:
         Q.size += 1
 
 
-def _coordinates(Q: SearchSpace, momenta: Array, each: Map, first: int) -> Array:
-    """(p, b) Q^T momenta, zero for the vectors before the first."""
+def _coordinates(Q: SearchSpace, momenta: Array, each: Map) -> Array:
+    """(p, b) Q^T momenta."""
 
     def of_rows(part: slice) -> Array:
-        coordinates = np.zeros((Q.size, momenta.shape[1]))
-        for numbers, rows in Q.used(first):
-            coordinates[numbers] = rows[:, part] @ momenta[part]
-        return coordinates
+        return np.vstack([np.zeros((0, momenta.shape[1])), *(rows[:, part] @ momenta[part] for _, rows in Q.used())])
 
     return np.sum(list(each(of_rows, pieces(len(momenta)))), axis=0)
 
 
-def _taken_out(vectors: Array, Q: SearchSpace, momenta: Array, each: Map, first: int) -> Array:
-    """(p, b) Q^T momenta, of which Q from the vector `first` on is subtracted from the vectors (Z, b)."""
-    coordinates = _coordinates(Q, momenta, each, first)
+def _take_out(vectors: Array, Q: SearchSpace, coordinates: Array, each: Map, first: int) -> None:
+    """Subtract Q coordinates (p, b), those from the vector `first` on, from the vectors (Z, b)."""
 
     def from_rows(part: slice) -> None:
         for numbers, rows in Q.used(first):
@@ -175,7 +175,6 @@ def _taken_out(vectors: Array, Q: SearchSpace, momenta: Array, each: Map, first:
 
     for _ in each(from_rows, pieces(len(vectors))):
         pass
-    return coordinates
 
 
 def _combined(Q: SearchSpace, coordinates: Array) -> Array:
