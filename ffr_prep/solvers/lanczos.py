@@ -53,7 +53,7 @@ def lowest_modes(
     T = np.zeros((0, 0))
     due = count if count > _MANY else 0
     block, momenta, _ = _orthonormal(flexibility(M @ start), Q, M, [])
-    last = []
+    last: list[Array] = []
     while True:
         last = [*last[-1:], momenta]
         _append(Q, block)
