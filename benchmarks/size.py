@@ -10,8 +10,9 @@ matrices and the second order of its surface beside it, --hundreds one of 300 mo
 Goals, on two quiet cores: 1,064,166 unknowns in 150 s and 10 GiB, 306,426 in 35 s and 3 GiB, 300 verified modes of these
 in 4 minutes.
 
-Every run is a process of its own. Printed are the time on the clock and the processor time of each step, which a busy
-machine disturbs less, and the most memory that the process ever had. The load of the machine stands beside every run.
+Every run is a process of its own. Printed are the time on the clock, the processor time, which a busy machine disturbs
+less, and the most memory of each step (elsewhere than on Linux: since the start). The load of the machine stands beside
+every run.
 
 The peer shares reading, checking, assembly, coupling, inertia integrals and file with us; the fixed-interface modes are
 those of `scipy.sparse.linalg.eigsh` in its shift-invert mode about zero on SciPy's SuperLU with the setting that was its
@@ -24,7 +25,6 @@ from __future__ import annotations
 import argparse
 import json
 import os
-import resource
 import subprocess
 import sys
 import tempfile
@@ -39,6 +39,7 @@ import scipy.sparse.linalg as spl
 
 import ffr_prep as fp
 from ffr_prep.body import FlexibleBody, save_body
+from ffr_prep.common.process_memory import begin_peak, peak
 from ffr_prep.mesh.mesh import read_mesh
 from ffr_prep.model.coupled import CoupledModel, InterfaceRegion
 from ffr_prep.model.material import material
@@ -61,9 +62,9 @@ _SIZES = ((3.1, 93_144), (1.93, 306_426), (1.2, 1_064_166))  # largest edge [mm]
 
 @dataclass
 class Clock:
-    """Notes what each step takes: time on the clock, processor time, most memory so far."""
+    """Notes what each step takes: time on the clock, processor time, most memory while it goes on [GiB]."""
 
-    steps: list[tuple[str, float, float]] = field(default_factory=list)
+    steps: list[tuple[str, float, float, float]] = field(default_factory=list)
     begun: tuple[str, float, float] | None = None
 
     def __call__(self, step: str) -> None:
@@ -71,7 +72,8 @@ class Clock:
         now = time.perf_counter(), time.process_time()
         if self.begun:
             name, wall, cpu = self.begun
-            self.steps.append((name, now[0] - wall, now[1] - cpu))
+            self.steps.append((name, now[0] - wall, now[1] - cpu, (peak() or 0) / 2**30))
+        begin_peak()
         self.begun = (step, *now)
 
 
@@ -104,8 +106,8 @@ def run(mesh_file: Path, body_file: Path, solver: str, ranks: int, kind: str) ->
     clock("write the body file")
     save_body(body, body_file)
     clock("")
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
-    figures = {"dof": 3 * len(mesh.points), "steps": clock.steps, "peak": peak, "frequencies": _hertz(body)}
+    most = max(step[3] for step in clock.steps)
+    figures = {"dof": 3 * len(mesh.points), "steps": clock.steps, "peak": most, "frequencies": _hertz(body)}
     print(json.dumps(figures))
 
 
@@ -113,9 +115,9 @@ def _reduced(mesh: Any, solver: str, ranks: int, kind: str, clock: Clock) -> Fle
     own: dict[str, Any] = {"solver": Solver(solver, ranks, kind == HUNDREDS)} if solver != "eigsh" else {}
     modes = 300 if kind == HUNDREDS else MODES
     if solver == "eigsh":
-        import ffr_prep.model.model
+        import ffr_prep.pipelines.reduce
 
-        ffr_prep.model.model.factorised = lambda *_: None  # type: ignore[assignment]  # its work is the peer's own
+        ffr_prep.pipelines.reduce.factorised = lambda *_: None  # type: ignore[attr-defined]  # its work is the peer's own
     return fp.reduce(
         fp.from_mesh(mesh, material("steel"), [InterfaceRegion(eye) for eye in EYES], progress=clock),
         fp.Request(
@@ -208,8 +210,8 @@ def _show(figures: dict[str, Any], load: float) -> None:
         f"{figures['solver']}, {figures['dof']} unknowns: {figures['wall']:.1f} s on the clock, {figures['cpu']:.1f} s of "
         f"processor, {figures['peak']:.2f} GiB at most (load before it {load:.1f} on {os.cpu_count()} cores)"
     )
-    for name, wall, cpu in figures["steps"]:
-        print(f"    {name:32s} {wall:7.1f} s {cpu:7.1f} s")
+    for name, wall, cpu, most in figures["steps"]:
+        print(f"    {name:32s} {wall:7.1f} s {cpu:7.1f} s {most:7.2f} GiB")
     sys.stdout.flush()
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import sys
 from pathlib import Path
 
@@ -52,8 +53,15 @@ def left() -> int | None:
     return min(sizes, default=None)
 
 
+def give_back() -> None:
+    """What was freed in small pieces goes back to the system, where the C library can (glibc): large arrays never use it."""
+    with contextlib.suppress(OSError, AttributeError, TypeError):
+        ctypes.CDLL(None).malloc_trim(0)
+
+
 def check_memory(size: float, what: str, remedy: str) -> None:
     """InputError where the machine has not the size [bytes] left that a computation is going to take."""
+    give_back()
     there = left()
     if there is not None and size > there:
         raise InputError(

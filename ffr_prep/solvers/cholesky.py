@@ -10,8 +10,11 @@ Sources: A. George, SIAM J. Numer. Anal. 10 (1973) 345-363 (nested dissection); 
 from __future__ import annotations
 
 import heapq
-from collections.abc import Iterable
+import os
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from queue import SimpleQueue
+from typing import TypeVar
 
 import numpy as np
 import scipy.sparse as sp
@@ -23,6 +26,7 @@ from ffr_prep.solvers.multifrontal import (
     DONE,
     Fronts,
     Sorted,
+    Workspace,
     add,
     backward,
     begin,
@@ -30,16 +34,23 @@ from ffr_prep.solvers.multifrontal import (
     diagonal_tile,
     eliminate_branch,
     forward,
+    keep,
+    kept,
+    largest,
     most_waiting,
-    panel_of,
+    pack,
     row_tile,
     shape,
+    taken,
+    triangle,
     update_tile,
 )
-from ffr_prep.solvers.nested_dissection import elimination_tree
+from ffr_prep.solvers.nested_dissection import NOTHING, elimination_tree
 from ffr_prep.solvers.threads import Map, threads
 
 _BRANCHES = 24  # a branch has at most this part of the work
+Made = TypeVar("Made")
+
 _TILE = 384
 LESS = (
     "take a coarser mesh, cut the body into parts, or reduce it where there is more memory, on several machines with the "
@@ -60,6 +71,11 @@ class Division:
     trunk: list[int]
     below: list[list[int]]
 
+    @property
+    def in_trunk(self) -> Array:
+        """(p, 2) the fronts of the trunk as runs of their own."""
+        return np.repeat(self.trunk, 2).reshape(-1, 2).astype(int)
+
 
 @dataclass(frozen=True)
 class Factor:
@@ -67,55 +83,77 @@ class Factor:
 
     order   : (n,) the unknown at each place of the elimination
     fronts  : the columns of L
-    targets : rows of the boundaries in a solution: a branch has copies of the rows outside it, after the n unknowns
-    copied  : (c,) the rows that these copy
+    stages  : the fronts in turn, each stage of runs that are independent of each other: all branches, then fronts of the
+              trunk whose fronts below are done
+    targets : rows of the boundaries in a solution: a run has copies of the rows outside it
+    rows    : how many rows a solution has, with the copies after the n unknowns
     """
 
     order: Array
     fronts: Fronts
     division: Division
+    stages: list[list[Run]]
     targets: Array
+    rows: int
+
+
+@dataclass(frozen=True)
+class Run:
+    """Fronts first...last, one after the other; copied (c,) : the rows that its copies copy, from the row `at` on."""
+
+    first: int
+    last: int
     copied: Array
+    at: int
 
 
-def cholesky(A: sp.csr_array, positions: Array, advance: Advance = no_advance) -> Factor:
-    """Factorise the symmetric positive definite A (n, n).
+def cholesky(A: sp.csr_array, positions: Array, advance: Advance = no_advance, held: Array = NOTHING) -> Factor:
+    """Factorise the symmetric positive definite A (n, n), or what is left of it without the rows and columns `held`.
 
     positions : (n, 3) where each unknown is, to cut by; rows of NaN for unknowns that touch many others, such as the
                 coordinates of a rigid interface, which are eliminated last
     advance   : called as the elimination proceeds, with the share of its operations
+    held      : numbers of unknowns that are zero in every solution
 
     Raises numpy.linalg.LinAlgError when A is not positive definite, InputError when the machine has too little memory.
     """
-    analysis = analysed(A, positions)
-    matrix, division = analysis.matrix, analysis.division
-    factor = 8 * int(analysis.fronts.offsets[-1])
-    check_memory(factor + waiting(analysis), f"factorising the stiffness of {len(matrix.order)} unknowns", LESS)
+    analysis = analysed(A, positions, held)
+    order, division, factor = analysis.matrix.order, analysis.division, 8 * int(analysis.fronts.offsets[-1])
+    check_memory(factor + waiting(analysis), f"factorising the stiffness of {len(order)} unknowns", LESS)
     advance(0.0, f"the factor takes {in_words(factor)}")
-    fronts = analysis.fronts._replace(panels=np.zeros(analysis.fronts.offsets[-1]))
+    fronts = analysis.fronts._replace(panels=np.empty(analysis.fronts.offsets[-1]))
     with threads() as each:
-        _eliminate_all(fronts, division, matrix, each, progress_of(analysis, advance))
-    return Factor(matrix.order, fronts, division, *_private_rows(fronts, division.branches))
+        _eliminate_all(fronts, division, analysis.matrix, each, progress_of(analysis, advance))
+    return Factor(order, fronts, division, *_stages(fronts, division))
 
 
 def solve_cholesky(factor: Factor, b: Array) -> Array:
     """A^-1 b for b (n, r)."""
     n = len(factor.order)
-    fronts, targets, trunk, branches = factor.fronts, factor.targets, factor.division.trunk, factor.division.branches
-    y = np.zeros((n + len(factor.copied), b.shape[1]))
-    y[:n] = b[factor.order]
-    with threads() as each:
-        finish(each(lambda branch: forward(fronts, targets, branch[0], branch[1], y), branches))
-        np.add.at(y, factor.copied, y[n:])
-        for k in trunk:
-            forward(fronts, targets, k, k, y)
-        for k in reversed(trunk):
-            backward(fronts, targets, k, k, y)
-        y[n:] = y[factor.copied]
-        finish(each(lambda branch: backward(fronts, targets, branch[0], branch[1], y), branches))
-    x = np.empty((n, b.shape[1]))
+    y = np.empty((factor.rows, b.shape[1]))
+    np.take(b, factor.order, axis=0, out=y[:n], mode="clip")  # which needs no copy
+    y[n:] = 0.0
+    _swept(factor, y)
+    x = np.zeros(b.shape)
     x[factor.order] = y[:n]
     return x
+
+
+def _swept(factor: Factor, y: Array) -> None:
+    """(L L^T)^-1 of the rows y of a solution, in place."""
+    fronts, targets = factor.fronts, factor.targets
+
+    def back(run: Run) -> None:
+        y[run.at : run.at + len(run.copied)] = y[run.copied]
+        backward(fronts, targets, run.first, run.last, y)
+
+    with threads() as each:
+        for stage in factor.stages:
+            finish(each(lambda run: forward(fronts, targets, run.first, run.last, y), stage))
+            for run in stage:
+                y[run.copied] += y[run.at : run.at + len(run.copied)]
+        for stage in reversed(factor.stages):
+            finish(each(back, stage))
 
 
 # ---- division of the work -----------------------------------------------------------------------------------------
@@ -130,17 +168,17 @@ class Analysis:
     division: Division
 
 
-def analysed(A: sp.csr_array, positions: Array) -> Analysis:
-    """What is known of the elimination of A (n, n) before any number is; positions as of `cholesky`."""
-    pieces, below = elimination_tree(A, positions)
+def analysed(A: sp.csr_array, positions: Array, held: Array = NOTHING) -> Analysis:
+    """What is known of the elimination of A (n, n) before any number is; the others as of `cholesky`."""
+    pieces, below = elimination_tree(A, positions, held)
     order = np.concatenate(pieces)
-    place = np.empty(len(order), np.int32)
+    place = np.full(len(positions), -1, np.int32)
     place[order] = np.arange(len(order))
     matrix = Sorted(A.indptr, A.indices, A.data, order, place)
     starts, children = np.cumsum([0, *map(len, pieces)]), np.array([len(of) for of in below])
     ends, boundary = boundaries(starts, children, matrix)
     own, rest = np.diff(starts), np.diff(ends)
-    offsets = np.concatenate([[0], np.cumsum(own * (own + rest))])
+    offsets = np.concatenate([[0], np.cumsum(kept(own, rest))])
     fronts = Fronts(starts, ends, boundary, offsets, np.zeros(0), children)
     return Analysis(matrix, fronts, _division(fronts, below))
 
@@ -168,34 +206,37 @@ def _work(fronts: Fronts) -> Array:
     return own * (own + rest) ** 2.0
 
 
-def _private_rows(fronts: Fronts, branches: Array) -> tuple[Array, Array]:
-    """The targets of all boundaries, and the rows that the branches have copies of."""
-    targets = fronts.boundary.astype(np.int64)
-    copied, count = [np.zeros(0, np.int64)], int(fronts.starts[-1])
-    for first, last in branches:
-        outside = fronts.boundary[fronts.ends[last] : fronts.ends[last + 1]].astype(np.int64)
-        of_branch = targets[fronts.ends[first] : fronts.ends[last + 1]]
-        leaving = of_branch >= fronts.starts[last + 1]
-        of_branch[leaving] = count + np.searchsorted(outside, of_branch[leaving])
-        copied.append(outside)
-        count += len(outside)
-    return targets, np.concatenate(copied)
+def _stages(fronts: Fronts, division: Division) -> tuple[list[list[Run]], Array, int]:
+    """The stages of a solution, the targets of all boundaries, and how many rows there are with the copies."""
+    stage_of = dict.fromkeys((int(last) for _, last in division.branches), 0)
+    for k in division.trunk:
+        stage_of[k] = 1 + max(stage_of[child] for child in division.below[k])
+    first = {int(last): int(first) for first, last in division.branches}
+    stages: list[list[Run]] = [[] for _ in range(1 + max(stage_of.values()))]
+    targets, rows = fronts.boundary.astype(np.int64), int(fronts.starts[-1])
+    for last, stage in sorted(stage_of.items()):
+        run = Run(first.get(last, last), last, fronts.boundary[fronts.ends[last] : fronts.ends[last + 1]], rows)
+        of_run = targets[fronts.ends[run.first] : fronts.ends[last + 1]]
+        leaving = of_run >= fronts.starts[last + 1]
+        of_run[leaving] = rows + np.searchsorted(run.copied, of_run[leaving])
+        rows += len(run.copied)
+        stages[stage].append(run)
+    return stages, targets, rows
 
 
 # ---- elimination --------------------------------------------------------------------------------------------------
 
 
 def waiting(analysis: Analysis) -> int:
-    """Bytes of the updates that wait for their fronts, at most: of two branches at work, and of all at their ends."""
+    """Bytes of fronts at work and of updates that wait for theirs, at most."""
     fronts, division = analysis.fronts, analysis.division
-    squares = np.diff(fronts.ends) ** 2
-    pending, places = np.empty(len(squares) + 1, np.int64), np.zeros(len(squares) + 2, np.int64)
-    inside = sorted(most_waiting(fronts, first, last, pending, places) for first, last in division.branches)[-2:]
-    height = most = int(sum(squares[last] for _, last in division.branches))
+    triangles = triangle(np.diff(fronts.ends))
+    height = most = int(sum(triangles[last] for _, last in division.branches))
     for k in division.trunk:
-        most = max(most, height + int(squares[k]))
-        height += int(squares[k] - squares[division.below[k]].sum())
-    return 8 * (most + int(sum(inside)))
+        most = max(most, height + int(triangles[k]))
+        height += int(triangles[k] - triangles[division.below[k]].sum())
+    in_branches, in_trunk = _at_work(division) * sum(_most(fronts, division.branches)), _most(fronts, division.in_trunk)
+    return 8 * (most + max(in_branches, sum(in_trunk)))
 
 
 @dataclass
@@ -220,24 +261,83 @@ def progress_of(analysis: Analysis, advance: Advance) -> Elimination:
 
 
 def _eliminate_all(fronts: Fronts, division: Division, matrix: Sorted, each: Map, elimination: Elimination) -> None:
-    results = each(lambda branch: eliminate_branch(fronts, branch[0], branch[1], matrix), division.branches)
+    updates = _eliminate_branches(fronts, division, matrix, each, elimination)
+    space = workspace(fronts, division.in_trunk, len(matrix.place))
+    for k in division.trunk:
+        panel, update = begun(fronts, k, matrix, space)
+        for child in division.below[k]:
+            add_tiled(fronts, child, updates.pop(child), panel, update, space.local, each)
+        _eliminate_tiled(fronts, k, panel, update, each)
+        updates[k] = packed(update)
+        elimination.add(k, k)
+
+
+def _eliminate_branches(
+    fronts: Fronts, division: Division, matrix: Sorted, each: Map, elimination: Elimination
+) -> dict[int, Array]:
+    """The updates of the last fronts of all branches."""
+    results = on_branches(eliminate_branch, fronts, division, matrix, each)
     updates: dict[int, Array] = {}
     for (first, last), (update, bad) in zip(division.branches, results, strict=True):
         _check_pivot(bad)
-        rest = shape(fronts, last)[1]
-        updates[int(last)] = update.reshape(rest, rest)
+        updates[int(last)] = update
         elimination.add(int(first), int(last))
-    local = np.empty(len(matrix.order), np.int32)
-    for k in division.trunk:
-        rest = shape(fronts, k)[1]
-        update = np.zeros((rest, rest))
-        panel = panel_of(fronts, k)
-        begin(fronts, k, panel, matrix, update, local)
-        for child in division.below[k]:
-            add_tiled(fronts, child, updates.pop(child), panel, update, local, each)
-        _eliminate_tiled(fronts, k, update, each)
-        updates[k] = update
-        elimination.add(k, k)
+    return updates
+
+
+# ---- workspaces, used again and again as fresh memory takes longer than filling it ---------------------------------
+
+
+def workspace(fronts: Fronts, runs: Array, unknowns: int) -> Workspace:
+    """What the elimination of any of the runs (t, 2), first and last front, needs."""
+    panel, update, waiting_updates = map(np.empty, _most(fronts, runs))
+    return Workspace(panel, update, waiting_updates, np.empty(unknowns, np.int32))
+
+
+def on_branches(
+    work: Callable[..., Made], fronts: Fronts, division: Division, matrix: Sorted, each: Map
+) -> Iterable[Made]:
+    """What the work makes of each branch in a workspace, of which there is one for each thread."""
+    spaces: SimpleQueue[Workspace] = SimpleQueue()
+    for _ in range(_at_work(division)):
+        spaces.put(workspace(fronts, division.branches, len(matrix.place)))
+
+    def in_turn(branch: Array) -> Made:
+        space = spaces.get()
+        try:
+            return work(fronts, branch[0], branch[1], matrix, space)
+        finally:
+            spaces.put(space)
+
+    return each(in_turn, division.branches)
+
+
+def _at_work(division: Division) -> int:
+    """How many branches are at work at a time."""
+    return min(os.cpu_count() or 1, len(division.branches))
+
+
+def _most(fronts: Fronts, runs: Array) -> list[int]:
+    """Numbers of the largest panel, of the largest update, and of the updates that wait at a time, of all runs (t, 2)."""
+    pending, places = np.empty(len(fronts.children) + 1, np.int64), np.zeros(len(fronts.children) + 2, np.int64)
+    sizes = [
+        (*largest(fronts, first, last), most_waiting(fronts, first, last, pending, places)) for first, last in runs
+    ]
+    return [max(of_all, default=0) for of_all in zip(*sizes, strict=True)] or [0, 0, 0]
+
+
+def begun(fronts: Fronts, k: int, matrix: Sorted, space: Workspace) -> tuple[Array, Array]:
+    """The panel and the update of a front, with the matrix in them, in the workspace."""
+    panel, update = taken(fronts, k, space)
+    begin(fronts, k, panel, matrix, update, space.local)
+    return panel, update
+
+
+def packed(update: Array) -> Array:
+    """The lower triangle of an update."""
+    lower = np.empty(triangle(len(update)))
+    pack(update, lower)
+    return lower
 
 
 def add_tiled(
@@ -247,21 +347,22 @@ def add_tiled(
     finish(
         each(
             lambda columns: add(fronts, child, of_child, panel, update, local, columns[0], columns[1]),
-            tiles(0, len(of_child)),
+            tiles(0, shape(fronts, child)[1]),
         )
     )
 
 
-def _eliminate_tiled(fronts: Fronts, k: int, update: Array, each: Map) -> None:
+def _eliminate_tiled(fronts: Fronts, k: int, front: Array, update: Array, each: Map) -> None:
     """As `eliminate`, by tiles that do not depend on the number of threads."""
     own, rest = shape(fronts, k)
-    size, panel = own + rest, fronts.panels[fronts.offsets[k] : fronts.offsets[k + 1]]
+    size, panel = own + rest, front.reshape(front.size)
     for first, last in tiles(0, own):
         bad = diagonal_tile(panel, size, first, last)
         _check_pivot(fronts.starts[k] + first + bad - 1 if bad else DONE)
         finish(each(lambda rows, of=(first, last): row_tile(panel, size, *of, *rows), tiles(last, size)))
     pairs = [(columns, rows) for columns in tiles(0, rest) for rows in tiles(0, rest) if rows >= columns]
     finish(each(lambda pair: update_tile(panel, own, update, *pair[0], *pair[1]), pairs))
+    keep(fronts, k, front)
 
 
 def tiles(start: int, stop: int) -> list[tuple[int, int]]:

@@ -30,10 +30,13 @@ from ffr_prep.common.progress import Advance, no_advance
 from ffr_prep.solvers.cholesky import LESS, cholesky, solve_cholesky
 from ffr_prep.solvers.inertia import modes_below
 from ffr_prep.solvers.lanczos import lowest_modes
+from ffr_prep.solvers.nested_dissection import NOTHING
 from ffr_prep.solvers.slepc import SlepcProcess, mpi_count, mpi_modes, mpi_solve, pencil, started
+from ffr_prep.solvers.threads import pieces, product_of_sizes
 from ffr_prep.solvers.verification import Verification, verified
 
 Solve = Callable[[Array], Array]
+Factorisation = Callable[[sp.csr_array, Array, Array, Advance], Solve]
 
 _SINGULAR = 1e13
 _SCALING_SWEEPS = 10
@@ -75,11 +78,21 @@ class Solver:
             )
 
 
-def _cholesky(A: sp.csr_array, positions: Array, advance: Advance) -> Solve:
-    return partial(solve_cholesky, cholesky(A, positions, advance))
+def _cholesky(A: sp.csr_array, positions: Array, held: Array, advance: Advance) -> Solve:
+    return partial(solve_cholesky, cholesky(A, positions, advance, held))
 
 
-def _superlu(A: sp.csr_array, positions: Array, advance: Advance) -> Solve:
+def _without(factorised: Callable[[sp.csr_array], Solve]) -> Factorisation:
+    """The factorisation of what is left without the unknowns that are held, of a whole matrix."""
+
+    def of_rest(A: sp.csr_array, positions: Array, held: Array, advance: Advance) -> Solve:
+        free = np.delete(np.arange(A.shape[0]), held)
+        return partial(_extended, factorised(A[free][:, free]), free)
+
+    return of_rest
+
+
+def _superlu(A: sp.csr_array) -> Solve:
     """Without pivoting, so that the signs of the pivots show whether A is positive definite."""
     try:
         lu = splu(A.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
@@ -90,7 +103,7 @@ def _superlu(A: sp.csr_array, positions: Array, advance: Advance) -> Solve:
     return lu.solve
 
 
-def _pardiso(A: sp.csr_array, positions: Array, advance: Advance) -> Solve:
+def _pardiso(A: sp.csr_array) -> Solve:
     """Matrix type 2, positive definite: with it Pardiso fails at a pivot that is not."""
     try:
         import pypardiso
@@ -105,10 +118,10 @@ def _pardiso(A: sp.csr_array, positions: Array, advance: Advance) -> Solve:
     return lambda b: pardiso.solve(upper, np.asfortranarray(b))
 
 
-_FACTORISATIONS: dict[str, Callable[[sp.csr_array, Array, Advance], Solve]] = {
+_FACTORISATIONS: dict[str, Factorisation] = {
     "cholesky": _cholesky,
-    "superlu": _superlu,
-    "pardiso": _pardiso,
+    "superlu": _without(_superlu),
+    "pardiso": _without(_pardiso),
 }
 CHOLESKY = Solver()
 
@@ -116,16 +129,23 @@ CHOLESKY = Solver()
 # ---- factorisation ------------------------------------------------------------------------------------------------
 
 
-def factorise(A: sp.csr_array, positions: Array, solver: Solver = CHOLESKY, advance: Advance = no_advance) -> Solve:
+def factorise(
+    A: sp.csr_array,
+    positions: Array,
+    solver: Solver = CHOLESKY,
+    advance: Advance = no_advance,
+    held: Array = NOTHING,
+) -> Solve:
     """The solver of a sparse symmetric positive definite matrix A (n, n): b (n, r) -> A^-1 b.
 
     positions : (n, 3) where each unknown is; rows of NaN for unknowns that touch many others
     advance   : told how far the factorisation is, where the solver knows (cholesky)
+    held      : numbers of unknowns that are zero in every solution; A needs be definite without them alone
 
     Raises ComputationError when A is singular to working precision, InputError when the solver is not installed.
     """
     try:
-        solve = _FACTORISATIONS[solver.name](A, positions, advance)
+        solve = _FACTORISATIONS[solver.name](A, positions, held, advance)
     except np.linalg.LinAlgError as error:
         raise ComputationError(f"the stiffness matrix is not positive definite ({error}); {_REMEDY}") from None
     _check_regular(A, solve)
@@ -172,12 +192,12 @@ def free_body(
     """
     rigid, _ = np.linalg.qr(T)
     _, order = scipy.linalg.qr(rigid.T, mode="r", pivoting=True)
+    if solver.name != "slepc":
+        solve = factorise(K, positions, solver, advance, order[:6])
+        count = partial(_counted, positions, advance)
+        return FreeBody(K, rigid, solve, partial(_by_lanczos, advance), _look(solver, count))
     free = np.delete(np.arange(K.shape[0]), order[:6])
     clamped = K[free][:, free]
-    if solver.name != "slepc":
-        solve = factorise(clamped, positions[free], solver, advance)
-        count = partial(_counted, positions, advance)
-        return FreeBody(K, rigid, partial(_extended, solve, free), partial(_by_lanczos, advance), _look(solver, count))
     process = started(clamped, solver.ranks)
     solve = partial(mpi_solve, process)
     _check_regular(clamped, solve)
@@ -282,7 +302,9 @@ def solve_supported(problem: SupportedBody, f: Array, c: Array) -> tuple[Array, 
     right = np.vstack([c - problem.C @ particular, problem.body.T.T @ f])
     solution = scipy.linalg.lu_solve(problem.bordered, problem.scale[:, None] * right) * problem.scale[:, None]
     mu, alpha = solution[: len(c)], solution[len(c) :]
-    return particular - problem.flexibility @ mu + problem.body.T @ alpha, mu
+    for part in pieces(len(particular)):  # in place, as fresh memory takes longer than filling it
+        particular[part] += problem.body.T[part] @ alpha - problem.flexibility[part] @ mu
+    return particular, mu
 
 
 def solve_refined(problem: SupportedBody, f: Array, c: Array) -> tuple[Array, Array]:
@@ -298,7 +320,7 @@ def solve_refined(problem: SupportedBody, f: Array, c: Array) -> tuple[Array, Ar
 def _check_residual(problem: SupportedBody, f: Array, u: Array, mu: Array) -> None:
     reaction = problem.C.T @ mu
     residual = np.linalg.norm(f - problem.body.K @ u - reaction)
-    noise = np.linalg.norm(abs(problem.body.K) @ np.abs(u))
+    noise = np.linalg.norm(product_of_sizes(problem.body.K, u))
     allowed = 1e-6 * (np.linalg.norm(f) + np.linalg.norm(reaction)) + 1e-11 * noise
     if not residual <= allowed:
         raise ComputationError(

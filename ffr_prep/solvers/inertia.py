@@ -25,7 +25,20 @@ from ffr_prep.common.arrays import Array
 from ffr_prep.common.compile_cache import check_compiled_code
 from ffr_prep.common.process_memory import check_memory
 from ffr_prep.common.progress import Advance, no_advance
-from ffr_prep.solvers.cholesky import LESS, Analysis, add_tiled, analysed, finish, progress_of, tiles, waiting
+from ffr_prep.solvers.cholesky import (
+    LESS,
+    Analysis,
+    add_tiled,
+    analysed,
+    begun,
+    finish,
+    on_branches,
+    packed,
+    progress_of,
+    tiles,
+    waiting,
+    workspace,
+)
 from ffr_prep.solvers.multifrontal import (
     INTEGERS,
     LETTERS,
@@ -34,15 +47,16 @@ from ffr_prep.solvers.multifrontal import (
     REALS,
     RIGHT,
     TRANSPOSED,
+    Workspace,
     add,
     begin,
     divide,
     external,
-    most_waiting,
-    move,
+    pack,
     product,
     pushed,
     shape,
+    taken,
 )
 from ffr_prep.solvers.threads import Map, threads
 
@@ -79,15 +93,14 @@ def negative_eigenvalues(A: sp.csr_array, positions: Array, advance: Advance = n
     check_memory(waiting(analysis), f"the count of modes of {len(matrix.order)} unknowns", LESS)
     elimination, updates, total = progress_of(analysis, advance), {}, 0
     with threads() as each:
-        found = each(lambda branch: _count_branch(fronts, branch[0], branch[1], matrix), division.branches)
+        found = on_branches(_count_branch, fronts, division, matrix, each)
         for (first, last), (update, count) in zip(division.branches, found, strict=True):
             total += _checked(count)
-            rest = shape(fronts, last)[1]
-            updates[int(last)] = update.reshape(rest, rest)
+            updates[int(last)] = update
             elimination.add(int(first), int(last))
-        local = np.empty(len(matrix.order), np.int32)
+        space = workspace(fronts, division.in_trunk, len(matrix.place))
         for k in division.trunk:
-            updates[k], count = _count_tiled(analysis, k, updates, local, each)
+            updates[k], count = _count_tiled(analysis, k, updates, space, each)
             total += _checked(count)
             elimination.add(k, k)
     return total
@@ -99,49 +112,46 @@ def _checked(count: int) -> int:
     return count
 
 
-def _count_tiled(analysis: Analysis, k: int, updates: dict[int, Array], local: Array, each: Map) -> tuple[Array, int]:
+def _count_tiled(
+    analysis: Analysis, k: int, updates: dict[int, Array], space: Workspace, each: Map
+) -> tuple[Array, int]:
     """The update of a large front and its negative pivots, on all threads by tiles that do not depend on their number."""
     own, rest = shape(analysis.fronts, k)
-    panel, update, scaled = np.zeros((own, own + rest)), np.zeros((rest, rest)), np.empty((own, rest))
-    begin(analysis.fronts, k, panel, analysis.matrix, update, local)
+    panel, update = begun(analysis.fronts, k, analysis.matrix, space)
     for child in analysis.division.below[k]:
-        add_tiled(analysis.fronts, child, updates.pop(child), panel, update, local, each)
+        add_tiled(analysis.fronts, child, updates.pop(child), panel, update, space.local, each)
     count, pivots, d, e = _split(panel)
+    scaled = np.empty((own, rest))
     if count != _SINGULAR:
         finish(each(lambda rows: _divided(panel, pivots, d, e, scaled, *rows), tiles(0, rest)))
         pairs = [(columns, rows) for columns in tiles(0, rest) for rows in tiles(0, rest) if rows >= columns]
         finish(each(lambda pair: _update_tile(panel, scaled, update, *pair[0], *pair[1]), pairs))
-    return update, count
+    return packed(update), count
 
 
 # ---- compiled -----------------------------------------------------------------------------------------------------
 
 
 @numba.njit(cache=True, nogil=True)
-def _count_branch(fronts, first, last, A):  # type: ignore[no-untyped-def]
+def _count_branch(fronts, first, last, A, space):  # type: ignore[no-untyped-def]
     """As `eliminate_branch`, by L D L^T and without keeping the panels: the update of the last front, negative pivots."""
-    local = np.empty(A.place.size, np.int32)
+    waiting, local = space.waiting, space.local
     pending = np.empty(last - first + 1, np.int64)
     places = np.zeros(last - first + 2, np.int64)
-    waiting = np.empty(most_waiting(fronts, first, last, pending, places))
     height, total = 0, 0
     for k in range(first, last + 1):
-        own, rest = shape(fronts, k)
-        panel = np.zeros((own, own + rest))
-        update = waiting[places[height] : places[height] + rest**2]
-        square = update.reshape((rest, rest))
-        begin(fronts, k, panel, A, square, local)
+        panel, update = taken(fronts, k, space)
+        begin(fronts, k, panel, A, update, local)
         for h in range(height - fronts.children[k], height):
-            size = shape(fronts, pending[h])[1]
-            of_child = waiting[places[h] : places[h + 1]].reshape((size, size))
-            add(fronts, pending[h], of_child, panel, square, local, 0, size)
-        count = _eliminate(panel, square)
+            of_child = waiting[places[h] : places[h + 1]]
+            add(fronts, pending[h], of_child, panel, update, local, 0, len(of_child))
+        count = _eliminate(panel, update)
         if count == _SINGULAR:
             total = _SINGULAR
             break
         total += count
         height = pushed(fronts, k, pending, places, height)
-        move(update, waiting[places[height - 1] : places[height]])
+        pack(update, waiting[places[height - 1] : places[height]])
     return waiting[: places[height]].copy(), total
 
 

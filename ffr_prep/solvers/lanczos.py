@@ -25,6 +25,7 @@ from ffr_prep.solvers.threads import Map, pieces, sparse_product, threads
 
 _RESIDUAL = 1e-9
 _DEPENDENT = 1e-10
+_AMPLIFIED = 1e-3  # of the rounding where a direction of a block is as small as this beside its largest
 _PANEL = 64
 _MANY = 100  # modes whose convergence is looked at after some passes only, as that takes the cube of the vectors
 _OFTEN = 1.03
@@ -51,11 +52,13 @@ def lowest_modes(
     Q = SearchSpace([])
     T = np.zeros((0, 0))
     due = count if count > _MANY else 0
-    block, momenta, _ = _orthonormal(flexibility(M @ start), Q, M)
+    block, momenta, _ = _orthonormal(flexibility(M @ start), Q, M, [])
+    last: list[Array] = []
     while True:
+        last = [*last[-1:], momenta]
         _append(Q, block)
         following = flexibility(momenta)
-        block, momenta, columns = _orthonormal(following, Q, M)
+        block, momenta, columns = _orthonormal(following, Q, M, last)
         T = _bordered(T, columns)
         full = len(T) + block.shape[1] > most or not block.size
         if len(T) < due and not full:
@@ -83,28 +86,47 @@ def _bordered(T: Array, columns: Array) -> Array:
     return np.block([[T, columns[:old]], [columns[:old].T, (corner + corner.T) / 2]])
 
 
-def _orthonormal(vectors: Array, Q: SearchSpace, M: sp.csr_array) -> tuple[Array, Array, Array]:
+def _orthonormal(vectors: Array, Q: SearchSpace, M: sp.csr_array, last: list[Array]) -> tuple[Array, Array, Array]:
     """What the vectors (Z, b) add to Q: an M-orthonormal basis, M times it, and the coordinates Q^T M of the vectors.
 
-    A second pass removes the rounding of the first.
+    But for rounding the vectors are coupled to the last vectors of Q alone, M times which is given in blocks. These parts
+    are taken out first; then nothing large is left that a single pass over all of Q would have to take out.
     """
+    vectors, momenta = np.array(vectors), np.empty(vectors.shape)
+    first = Q.size - sum(known.shape[1] for known in last)
     with threads() as each:
-        momenta = sparse_product(M, vectors, each)
-        coordinates = _coordinates(Q, momenta, each)
-        smallest = _DEPENDENT**2 * np.einsum("zi,zi->i", vectors, momenta).max(initial=0.0)
-        vectors, momenta = _normalised(_removed(vectors, Q, coordinates, each), M, smallest, each)
-        vectors = _removed(vectors, Q, _coordinates(Q, momenta, each), each)
-        vectors, momenta = _normalised(vectors, M, 0.5, each)
+        coordinates = np.vstack([np.zeros((first, vectors.shape[1])), *(known.T @ vectors for known in last)])
+        _take_out(vectors, Q, coordinates, each, first)
+        rounding = _coordinates(Q, sparse_product(M, vectors, each, momenta), each)
+        _take_out(vectors, Q, rounding, each, 0)
+        coordinates += rounding
+        size = np.sum(coordinates**2, axis=0) + np.einsum("zi,zi->i", vectors, momenta)
+        vectors, momenta, amplified = _normalised(vectors, momenta, _DEPENDENT**2 * size.max(initial=0.0))
+        if amplified:
+            _take_out(vectors, Q, _coordinates(Q, sparse_product(M, vectors, each, momenta), each), each, 0)
+        vectors, momenta, _ = _normalised(vectors, sparse_product(M, vectors, each, momenta), 0.5)
     return vectors, momenta, coordinates
 
 
-def _normalised(vectors: Array, M: sp.csr_array, smallest: float, each: Map) -> tuple[Array, Array]:
-    """M-orthonormal basis of the vectors without directions of a smaller squared norm, and M times it."""
-    momenta = sparse_product(M, vectors, each)
+def _normalised(vectors: Array, momenta: Array, smallest: float) -> tuple[Array, Array, bool]:
+    """M-orthonormal basis of the vectors without directions of a smaller squared norm, M times it, and whether some are so
+    small that their rounding is large.
+
+    momenta : M times the vectors; what these were freed of since does no harm, as they have no more of it. Both are
+              overwritten: fresh memory takes longer than filling it.
+    """
     squares, axes = scipy.linalg.eigh(vectors.T @ momenta)
     kept = squares > smallest
     combination = axes[:, kept] / np.sqrt(squares[kept])
-    return vectors @ combination, momenta @ combination
+    amplified = bool((squares[kept] < _AMPLIFIED**2 * squares.max(initial=0.0)).any())
+    return _turned(vectors, combination), _turned(momenta, combination), amplified
+
+
+def _turned(vectors: Array, combination: Array) -> Array:
+    """(Z, k) vectors (Z, b) times a combination (b, k), in their memory if k = b."""
+    for part in pieces(len(vectors)):
+        vectors[part, : combination.shape[1]] = vectors[part] @ combination
+    return np.ascontiguousarray(vectors[:, : combination.shape[1]])
 
 
 # ---- the search space: rows of panels, which make large products of matrices --------------------------------------
@@ -117,10 +139,14 @@ class SearchSpace:
     panels: list[Array]
     size: int = 0
 
-    @property
-    def used(self) -> list[Array]:
-        """The rows of the panels that are filled."""
-        return [panel[: self.size - k * _PANEL] for k, panel in enumerate(self.panels)]
+    def used(self, first: int = 0) -> list[tuple[slice, Array]]:
+        """The vectors from a number on: their numbers and rows, panel by panel."""
+        filled = []
+        for k, panel in enumerate(self.panels):
+            begin, end = max(first, k * _PANEL), min(self.size, (k + 1) * _PANEL)
+            if begin < end:
+                filled.append((slice(begin, end), panel[begin - k * _PANEL : end - k * _PANEL]))
+        return filled
 
 
 def _append(Q: SearchSpace, block: Array) -> None:
@@ -135,25 +161,31 @@ def _coordinates(Q: SearchSpace, momenta: Array, each: Map) -> Array:
     """(p, b) Q^T momenta."""
 
     def of_rows(part: slice) -> Array:
-        return np.vstack([np.zeros((0, momenta.shape[1])), *(panel[:, part] @ momenta[part] for panel in Q.used)])
+        return np.vstack([np.zeros((0, momenta.shape[1])), *(rows[:, part] @ momenta[part] for _, rows in Q.used())])
 
     return np.sum(list(each(of_rows, pieces(len(momenta)))), axis=0)
 
 
-def _removed(vectors: Array, Q: SearchSpace, coordinates: Array, each: Map) -> Array:
-    """(Z, b) vectors - Q coordinates."""
-    left = np.array(vectors)
+def _take_out(vectors: Array, Q: SearchSpace, coordinates: Array, each: Map, first: int) -> None:
+    """Subtract Q coordinates (p, b), those from the vector `first` on, from the vectors (Z, b)."""
 
     def from_rows(part: slice) -> None:
-        for k, panel in enumerate(Q.used):
-            left[part] -= panel[:, part].T @ coordinates[k * _PANEL : (k + 1) * _PANEL]
+        for numbers, rows in Q.used(first):
+            vectors[part] -= rows[:, part].T @ coordinates[numbers]
 
     for _ in each(from_rows, pieces(len(vectors))):
         pass
-    return left
 
 
 def _combined(Q: SearchSpace, coordinates: Array) -> Array:
     """(Z, b) Q coordinates (p, b)."""
+    whole = np.zeros((Q.panels[0].shape[1], coordinates.shape[1]))
+
+    def of_rows(part: slice) -> None:
+        for numbers, rows in Q.used():
+            whole[part] += rows[:, part].T @ coordinates[numbers]
+
     with threads() as each:
-        return -_removed(np.zeros((Q.panels[0].shape[1], coordinates.shape[1])), Q, coordinates, each)
+        for _ in each(of_rows, pieces(len(whole))):
+            pass
+    return whole

@@ -5,6 +5,9 @@ unknowns that they touch (the boundary); elimination turns it into the columns o
 update of the boundary by the boundary, of which only the lower triangle counts. Arrays are [column, row]: a column is
 contiguous, as BLAS and LAPACK want it.
 
+What waits is kept without zeros: panels in strips of columns, each from its first column's diagonal on, updates as their
+lower triangle, column after column.
+
 Source: J. W. H. Liu, SIAM Review 34 (1992) 82-109 (the multifrontal method).
 """
 
@@ -29,13 +32,15 @@ REALS = types.CPointer(types.float64)
 INTEGERS = types.CPointer(types.int32)
 LETTERS = types.CPointer(types.uint8)
 
+STRIP = 32
+
 
 class Fronts(NamedTuple):
     """All fronts of a matrix, one after the other in the order of elimination.
 
     starts   : (F + 1,) first unknown of each, in that order
     ends     : (F + 1,) where the boundary of each is in `boundary`, ascending
-    offsets  : (F + 1,) where the panel of each is in `panels`
+    offsets  : (F + 1,) where the strips of the panel of each are in `panels`
     children : (F,) how many fronts are directly below each; in that order they are the last ones without a parent
     """
 
@@ -55,6 +60,15 @@ class Sorted(NamedTuple):
     data: Array
     order: Array
     place: Array
+
+
+class Workspace(NamedTuple):
+    """Memory for a front at work, its panel and its update, for the updates that wait, and (n,) for places."""
+
+    panel: Array
+    update: Array
+    waiting: Array
+    local: Array
 
 
 # ---- BLAS and LAPACK ----------------------------------------------------------------------------------------------
@@ -175,11 +189,37 @@ def shape(fronts, k):  # type: ignore[no-untyped-def]
     return fronts.starts[k + 1] - fronts.starts[k], fronts.ends[k + 1] - fronts.ends[k]
 
 
+def kept(own: Array, rest: Array) -> Array:
+    """How many numbers the strips of panels (own, own + rest) have."""
+    whole, last = own // STRIP, own % STRIP
+    of_whole = STRIP * (whole * (own + rest) - STRIP * (whole * (whole - 1) // 2))
+    return of_whole + last * (own + rest - STRIP * whole)
+
+
 @numba.njit(cache=True, nogil=True)
-def panel_of(fronts, k):  # type: ignore[no-untyped-def]
-    """(own, own + boundary) the panel of a front."""
-    own, rest = shape(fronts, k)
-    return fronts.panels[fronts.offsets[k] : fronts.offsets[k + 1]].reshape((own, own + rest))
+def keep(fronts, k, panel):  # type: ignore[no-untyped-def]
+    """The panel (own, own + rest) of a front that is eliminated, as strips into the factor."""
+    own, size = panel.shape
+    at = fronts.offsets[k]
+    for c in range(own):
+        first = c - c % STRIP
+        fronts.panels[at : at + size - first] = panel[c, first:]
+        at += size - first
+
+
+@numba.njit(cache=True, nogil=True)
+def triangle(rest):  # type: ignore[no-untyped-def]
+    """How many numbers the lower triangle of an update has."""
+    return rest * (rest + 1) // 2
+
+
+@numba.njit(cache=True, nogil=True)
+def pack(update, triangle):  # type: ignore[no-untyped-def]
+    """The lower triangle of an update (rest, rest) into an array."""
+    at, rest = 0, update.shape[0]
+    for j in range(rest):
+        triangle[at : at + rest - j] = update[j, j:]
+        at += rest - j
 
 
 @numba.njit(cache=True, nogil=True)
@@ -190,6 +230,7 @@ def begin(fronts, k, panel, A, update, local):  # type: ignore[no-untyped-def]
     start, stop = fronts.starts[k], fronts.starts[k + 1]
     local[start:stop] = np.arange(own)
     local[fronts.boundary[fronts.ends[k] : fronts.ends[k + 1]]] = np.arange(own, own + rest)
+    panel[:] = 0.0
     for p in range(start, stop):
         row = A.order[p]
         for e in range(A.indptr[row], A.indptr[row + 1]):
@@ -202,66 +243,62 @@ def begin(fronts, k, panel, A, update, local):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True)
 def add(fronts, child, of_child, panel, update, local, first, last):  # type: ignore[no-untyped-def]
-    """Add columns first...last of the update of a front below to a front that has begun."""
+    """Add columns first...last of the update of a front below, a triangle, to a front that has begun."""
     places = local[fronts.boundary[fronts.ends[child] : fronts.ends[child + 1]]]
-    own = panel.shape[0]
-    for j in range(first, min(last, places.size)):
+    own, size = panel.shape[0], places.size
+    for j in range(first, min(last, size)):
+        column = of_child[j * size - triangle(j) : (j + 1) * size - triangle(j)]
         if places[j] < own:
-            for i in range(j, places.size):
-                panel[places[j], places[i]] += of_child[j, i]
+            for i in range(j, size):
+                panel[places[j], places[i]] += column[i]
         else:
-            for i in range(j, places.size):
-                update[places[j] - own, places[i] - own] += of_child[j, i]
+            for i in range(j, size):
+                update[places[j] - own, places[i] - own] += column[i]
 
 
 @numba.njit(cache=True, nogil=True)
-def eliminate(fronts, k, update):  # type: ignore[no-untyped-def]
+def eliminate(fronts, k, panel, update):  # type: ignore[no-untyped-def]
     """The panel becomes columns of the factor, the update is completed; the first bad pivot or DONE."""
     own, rest = shape(fronts, k)
     size = own + rest
-    panel = fronts.panels[fronts.offsets[k] : fronts.offsets[k + 1]]
-    bad = triangular(panel, own, size)
+    flat = panel.reshape(panel.size)
+    bad = triangular(flat, own, size)
     if bad:
         return fronts.starts[k] + bad - 1
     if rest:
-        divide(RIGHT, True, panel, panel[own:], rest, own, size, size)
-        minus_square(panel[own:], update, rest, own, size, rest)
+        divide(RIGHT, True, flat, flat[own:], rest, own, size, size)
+        minus_square(flat[own:], update, rest, own, size, rest)
+    keep(fronts, k, panel)
     return DONE
 
 
 @numba.njit(cache=True, nogil=True)
-def eliminate_branch(fronts, first, last, A):  # type: ignore[no-untyped-def]
-    """Eliminate the fronts first...last, a front and all below it: the update of the last, and a bad pivot or DONE.
-
-    The updates that wait for their front are in one array, as asking for memory takes longer than filling it.
-    """
-    local = np.empty(A.place.size, np.int32)
+def eliminate_branch(fronts, first, last, A, space):  # type: ignore[no-untyped-def]
+    """Eliminate the fronts first...last, a front and all below it: the update of the last, and a bad pivot or DONE."""
+    waiting, local = space.waiting, space.local
     pending = np.empty(last - first + 1, np.int64)
     places = np.zeros(last - first + 2, np.int64)
-    waiting = np.empty(most_waiting(fronts, first, last, pending, places))
     height = 0
     for k in range(first, last + 1):
-        rest = shape(fronts, k)[1]
-        update = waiting[places[height] : places[height] + rest**2]
-        panel = panel_of(fronts, k)
-        begin(fronts, k, panel, A, update.reshape((rest, rest)), local)
+        panel, update = taken(fronts, k, space)
+        begin(fronts, k, panel, A, update, local)
         for h in range(height - fronts.children[k], height):
-            size = shape(fronts, pending[h])[1]
-            of_child = waiting[places[h] : places[h + 1]].reshape((size, size))
-            add(fronts, pending[h], of_child, panel, update.reshape((rest, rest)), local, 0, size)
-        bad = eliminate(fronts, k, update)
+            of_child = waiting[places[h] : places[h + 1]]
+            add(fronts, pending[h], of_child, panel, update, local, 0, len(of_child))
+        bad = eliminate(fronts, k, panel, update)
         if bad != DONE:
             break
         height = pushed(fronts, k, pending, places, height)
-        move(update, waiting[places[height - 1] : places[height]])
+        pack(update, waiting[places[height - 1] : places[height]])
     return waiting[: places[height]].copy(), bad
 
 
 @numba.njit(cache=True, nogil=True)
-def move(source, target):  # type: ignore[no-untyped-def]
-    """Copy to an array that begins at or before the source in the same memory."""
-    for i in range(source.size):
-        target[i] = source[i]
+def taken(fronts, k, space):  # type: ignore[no-untyped-def]
+    """The panel (own, own + rest) and the update (rest, rest) of a front, of the workspace."""
+    own, rest = shape(fronts, k)
+    panel = space.panel[: own * (own + rest)].reshape((own, own + rest))
+    return panel, space.update[: rest**2].reshape((rest, rest))
 
 
 @numba.njit(cache=True, nogil=True)
@@ -269,7 +306,7 @@ def pushed(fronts, k, pending, places, height):  # type: ignore[no-untyped-def]
     """The update of a front takes the place of those below it: how many wait then."""
     height -= fronts.children[k]
     pending[height] = k
-    places[height + 1] = places[height] + shape(fronts, k)[1] ** 2
+    places[height + 1] = places[height] + triangle(shape(fronts, k)[1])
     return height + 1
 
 
@@ -278,9 +315,19 @@ def most_waiting(fronts, first, last, pending, places):  # type: ignore[no-untyp
     """How large the updates of the fronts first...last become together; the arrays are for work."""
     height, most = 0, 0
     for k in range(first, last + 1):
-        most = max(most, places[height] + shape(fronts, k)[1] ** 2)
         height = pushed(fronts, k, pending, places, height)
+        most = max(most, places[height])
     return most
+
+
+@numba.njit(cache=True, nogil=True)
+def largest(fronts, first, last):  # type: ignore[no-untyped-def]
+    """How many numbers the largest panel and the largest update of the fronts first...last have."""
+    panel, update = 0, 0
+    for k in range(first, last + 1):
+        own, rest = shape(fronts, k)
+        panel, update = max(panel, own * (own + rest)), max(update, rest**2)
+    return panel, update
 
 
 # ---- tiles of large fronts ----------------------------------------------------------------------------------------
@@ -329,46 +376,69 @@ def update_tile(panel, own, update, first, last, top, bottom):  # type: ignore[n
 @numba.njit(cache=True, nogil=True)
 def forward(fronts, targets, first, last, y):  # type: ignore[no-untyped-def]
     """L^-1 for the fronts first...last; y (rows, r), `targets` the rows of the boundaries."""
-    r = y.shape[1]
+    space = np.empty(y.shape[1] * tallest(fronts, first, last))
     for k in range(first, last + 1):
         own, rest = shape(fronts, k)
-        start, size = fronts.starts[k], own + rest
-        panel = fronts.panels[fronts.offsets[k] : fronts.offsets[k + 1]]
-        x = y[start : start + own].T.copy()
-        divide(LEFT, False, panel, x, own, r, size, own)
-        y[start : start + own] = x.T
-        if rest:
-            change = np.empty((r, rest))
-            product(PLAIN, PLAIN, panel[own:], x, change, rest, r, own, (size, own, rest), 1.0)
-            _scatter(change, targets[fronts.ends[k] : fronts.ends[k + 1]], y)
+        x = space[: y.shape[1] * (own + rest)].reshape((y.shape[1], own + rest))
+        x[:, own:] = 0.0
+        x[:, :own] = y[fronts.starts[k] : fronts.starts[k + 1]].T
+        _down(fronts.panels[fronts.offsets[k] : fronts.offsets[k + 1]], own, x)
+        y[fronts.starts[k] : fronts.starts[k + 1]] = x[:, :own].T
+        rows = targets[fronts.ends[k] : fronts.ends[k + 1]]
+        for i in range(rest):
+            for c in range(y.shape[1]):
+                y[rows[i], c] += x[c, own + i]
 
 
 @numba.njit(cache=True, nogil=True)
-def _scatter(change, rows, y):  # type: ignore[no-untyped-def]
-    for i in range(rows.size):
-        for c in range(y.shape[1]):
-            y[rows[i], c] -= change[c, i]
+def _down(panel, own, x):  # type: ignore[no-untyped-def]
+    """L^-1 of the own part of x (r, own + rest), and what that takes from the rest; panel : strips of a front."""
+    r, size = x.shape
+    flat, at = x.reshape(x.size), 0
+    for a in range(0, own, STRIP):
+        b = min(a + STRIP, own)
+        divide(LEFT, False, panel[at:], flat[a:], b - a, r, size - a, size)
+        if b < size:
+            below, sizes = panel[at + b - a :], (size - a, size, size)
+            product(PLAIN, PLAIN, below, flat[a:], flat[b:], size - b, r, b - a, sizes, -1.0)
+        at += (b - a) * (size - a)
 
 
 @numba.njit(cache=True, nogil=True)
 def backward(fronts, targets, first, last, y):  # type: ignore[no-untyped-def]
     """L^-T for the fronts first...last, the last first."""
-    r = y.shape[1]
+    space = np.empty(y.shape[1] * tallest(fronts, first, last))
     for k in range(last, first - 1, -1):
         own, rest = shape(fronts, k)
-        start, size = fronts.starts[k], own + rest
-        panel = fronts.panels[fronts.offsets[k] : fronts.offsets[k + 1]]
-        x = y[start : start + own].T.copy()
-        if rest:
-            known = np.empty((r, rest))
-            _gather(y, targets[fronts.ends[k] : fronts.ends[k + 1]], known)
-            product(TRANSPOSED, PLAIN, panel[own:], known, x, own, r, rest, (size, rest, own), -1.0)
-        divide(LEFT, True, panel, x, own, r, size, own)
-        y[start : start + own] = x.T
+        x = space[: y.shape[1] * (own + rest)].reshape((y.shape[1], own + rest))
+        x[:, :own] = y[fronts.starts[k] : fronts.starts[k + 1]].T
+        rows = targets[fronts.ends[k] : fronts.ends[k + 1]]
+        for i in range(rest):
+            for c in range(y.shape[1]):
+                x[c, own + i] = y[rows[i], c]
+        _up(fronts.panels[fronts.offsets[k] : fronts.offsets[k + 1]], own, x)
+        y[fronts.starts[k] : fronts.starts[k + 1]] = x[:, :own].T
 
 
 @numba.njit(cache=True, nogil=True)
-def _gather(y, rows, known):  # type: ignore[no-untyped-def]
-    for i in range(rows.size):
-        for c in range(y.shape[1]):
-            known[c, i] = y[rows[i], c]
+def _up(panel, own, x):  # type: ignore[no-untyped-def]
+    """L^-T of the own part of x (r, own + rest), whose rest is known; panel : strips of a front."""
+    r, size = x.shape
+    flat, at = x.reshape(x.size), panel.size
+    for a in range(own - 1 - (own - 1) % STRIP, -1, -STRIP):
+        b = min(a + STRIP, own)
+        at -= (b - a) * (size - a)
+        if b < size:
+            below, sizes = panel[at + b - a :], (size - a, size, size)
+            product(TRANSPOSED, PLAIN, below, flat[b:], flat[a:], b - a, r, size - b, sizes, -1.0)
+        divide(LEFT, True, panel[at:], flat[a:], b - a, r, size - a, size)
+
+
+@numba.njit(cache=True, nogil=True)
+def tallest(fronts, first, last):  # type: ignore[no-untyped-def]
+    """Most unknowns of one of the fronts first...last."""
+    most = 0
+    for k in range(first, last + 1):
+        own, rest = shape(fronts, k)
+        most = max(most, own + rest)
+    return most

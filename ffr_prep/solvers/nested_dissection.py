@@ -1,12 +1,10 @@
 """Nested dissection: an order of elimination that keeps a sparse factor small.
 
-The unknowns are cut in two halves by a plane across their longest extent, again and again; what separates two halves is
-eliminated after both. The separator is the smallest set of points that covers all edges across the cut, which by
-Konig's theorem follows from a maximum matching of these edges. On second-order tetrahedra this
-halves the work of the factorisation, compared with the layer of points along the plane.
+The unknowns are cut in two across their longest extent, again and again; what separates two parts is eliminated after
+both. The separator is the smallest set of points in the middle of the extent (`ffr_prep.solvers.separators`), so it
+finds the narrow places of a body and needs not be plane.
 
-Sources: A. George, SIAM J. Numer. Anal. 10 (1973) 345-363 (nested dissection); A. Pothen, C.-J. Fan, ACM Trans. Math.
-Softw. 16 (1990) 303-324 (separators from matchings).
+Source: A. George, SIAM J. Numer. Anal. 10 (1973) 345-363.
 """
 
 from __future__ import annotations
@@ -14,25 +12,29 @@ from __future__ import annotations
 import numba
 import numpy as np
 import scipy.sparse as sp
-from scipy.sparse.csgraph import maximum_bipartite_matching
 
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.compile_cache import check_compiled_code
+from ffr_prep.solvers.separators import separated
 
 check_compiled_code()
 
 Tree = tuple[list[Array], list[list[int]]]
 
-_LEAF = 40
+NOTHING = np.zeros(0, int)
+_LEAF = 16
+_LEAST = 0.2  # of a part on either side of a cut
 
 
-def elimination_tree(A: sp.csr_array, positions: Array) -> Tree:
+def elimination_tree(A: sp.csr_array, positions: Array, held: Array = NOTHING) -> Tree:
     """Pieces of unknowns in the order of their elimination, and for each the earlier pieces directly below it.
 
     All pieces below a piece precede it without a gap. positions : (n, 3) where each unknown is; rows of NaN for
-    unknowns that touch many others, which are eliminated last.
+    unknowns that touch many others, which are eliminated last. held : numbers of those that belong to no piece.
     """
-    placed = np.flatnonzero(np.isfinite(positions[:, 0]))
+    free = np.ones(len(positions), bool)
+    free[held] = False
+    placed = np.flatnonzero(np.isfinite(positions[:, 0]) & free)
     points, index = np.unique(positions[placed], axis=0, return_inverse=True)
     point_of = np.full(len(positions), -1)
     point_of[placed] = index.ravel()
@@ -40,7 +42,8 @@ def elimination_tree(A: sp.csr_array, positions: Array) -> Tree:
     ends = np.searchsorted(point_of[by_point], np.arange(len(points) + 1))
     pieces, children = _dissection(points, _graph(A, point_of, by_point, ends))
     unknowns = [_joined(by_point, ends, piece) for piece in pieces]
-    last = np.setdiff1d(np.arange(len(positions)), placed)
+    free[placed] = False
+    last = np.flatnonzero(free)
     if last.size:
         children.append(_tops(children))
         unknowns.append(last)
@@ -106,61 +109,12 @@ def _dissection(points: Array, graph: sp.csr_array) -> Tree:
 
 
 def _cut(points: Array, graph: sp.csr_array, part: Array, place: Array) -> tuple[Array, Array, Array]:
-    """Two halves of a part that do not touch each other, and the points between them; `place` (N,) is all -1 and stays."""
+    """Two parts of a part that do not touch each other, and the points between; `place` (N,) is all -1 and stays."""
     offsets = points[part] - points[part].mean(axis=0)
     _, axes = np.linalg.eigh(offsets.T @ offsets)
-    along = np.argsort(offsets @ axes[:, -1], kind="stable")
-    one, two = np.sort(part[along[: len(part) // 2]]), np.sort(part[along[len(part) // 2 :]])
-    place[two] = np.arange(two.size)
-    across = _edges(graph, one, place, two.size)
-    place[two] = -1
-    of_one, of_two = _cover(across)
-    return one[~of_one], two[~of_two], np.sort(np.concatenate([one[of_one], two[of_two]]))
-
-
-def _edges(graph: sp.csr_array, one: Array, place: Array, count: int) -> sp.csr_array:
-    """(one, two) edges between the halves; place (N,) is the number of a point in the second half, -1 elsewhere."""
-    rows = graph[one]
-    found = place[rows.indices]
-    inside = np.concatenate([[0], np.cumsum(found >= 0)]).astype(np.int32)
-    indices = found[found >= 0].astype(np.int32)
-    return sp.csr_array((np.ones(indices.size, np.int8), indices, inside[rows.indptr]), shape=(one.size, count))
-
-
-def _cover(edges: sp.csr_array) -> tuple[Array, Array]:
-    """The rows (p,) and columns (q,) of a smallest vertex cover (Konig).
-
-    Of what alternating paths from the unmatched rows reach: the columns, and the rows that they do not reach.
-    """
-    match = maximum_bipartite_matching(edges, perm_type="column")
-    row_of = np.full(edges.shape[1], -1)
-    row_of[match[match >= 0]] = np.flatnonzero(match >= 0)
-    return _reached(edges.indptr, edges.indices, match, row_of)
-
-
-@numba.njit(cache=True)
-def _reached(indptr, indices, match, row_of):  # type: ignore[no-untyped-def]
-    rows = np.diff(indptr) > 0
-    columns = np.zeros(row_of.size, np.bool_)
-    stack = np.empty(match.size, np.int64)
-    height = 0
-    for row in range(match.size):
-        if rows[row] and match[row] < 0:
-            rows[row] = False
-            stack[height] = row
-            height += 1
-    while height:
-        height -= 1
-        row = stack[height]
-        for column in indices[indptr[row] : indptr[row + 1]]:
-            if not columns[column]:
-                columns[column] = True
-                following = row_of[column]
-                if following >= 0 and rows[following]:
-                    rows[following] = False
-                    stack[height] = following
-                    height += 1
-    return rows, columns
+    along = part[np.argsort(offsets @ axes[:, -1], kind="stable")]
+    low = max(int(_LEAST * part.size), 1)
+    return separated(graph.indptr, graph.indices, along, low, part.size - low, place)
 
 
 def _tops(children: list[list[int]]) -> list[int]:

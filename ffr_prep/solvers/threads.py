@@ -70,10 +70,10 @@ def pieces(size: int) -> list[slice]:
     return [slice(int(a), int(b)) for a, b in pairwise(ends)]
 
 
-def sparse_product(A: sp.csr_array, X: Array, each: Map) -> Array:
-    """A X for a sparse A (n, m) and X (m, b), on all threads."""
+def sparse_product(A: sp.csr_array, X: Array, each: Map, out: Array | None = None) -> Array:
+    """A X for a sparse A (n, m) and X (m, b), on all threads; into `out` (n, b) where that is given."""
     X = np.ascontiguousarray(X)
-    out = np.empty((A.shape[0], X.shape[1]))
+    out = np.empty((A.shape[0], X.shape[1])) if out is None else out
 
     multiply = _multiply_eight if X.shape[1] == 8 else _multiply
 
@@ -83,6 +83,11 @@ def sparse_product(A: sp.csr_array, X: Array, each: Map) -> Array:
     for _ in each(rows, pieces(len(out))):
         pass
     return out
+
+
+def product_of_sizes(A: sp.csr_array, X: Array) -> Array:
+    """|A| |X| for a sparse A (n, m) and X (m, b), without a copy of either."""
+    return np.concatenate([abs(A[rows]) @ np.abs(X) for rows in pieces(A.shape[0])])
 
 
 @numba.njit(cache=True, nogil=True)

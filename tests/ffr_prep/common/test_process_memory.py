@@ -28,6 +28,26 @@ def test_what_is_left_is_the_least_of_machine_and_container(monkeypatch, tmp_pat
     assert process_memory.left() == 31000
 
 
+def test_what_was_freed_in_small_pieces_goes_back_or_stays():
+    """Thousands of pieces below the size that the C library asks the system for, and one above them that stays."""
+    if not process_memory._STATUS.exists():
+        pytest.skip("the system does not tell the memory of a process")
+    pieces = [np.ones(1000) for _ in range(20_000)]
+    last = np.ones(1000)
+    process_memory.begin_peak()
+    with_them = process_memory.peak()
+    pieces.clear()
+    process_memory.give_back()
+    process_memory.begin_peak()
+    assert last.size
+    assert process_memory.peak() <= with_them
+
+
+def test_without_a_c_library_that_can_nothing_is_given_back(monkeypatch):
+    monkeypatch.setattr("ctypes.CDLL", lambda name: object())
+    process_memory.give_back()
+
+
 def test_a_factor_that_the_machine_cannot_hold_is_refused(monkeypatch, tmp_path):
     machine(monkeypatch, tmp_path, meminfo="MemAvailable: 1 kB\n")
     with pytest.raises(

@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 from boxes import STEEL, box_mesh, shaken
+from scipy.sparse.csgraph import maximum_flow
 
 from ffr_prep.solids.assembly import assemble
 from ffr_prep.solvers.cholesky import cholesky, solve_cholesky
 from ffr_prep.solvers.nested_dissection import _cut, elimination_tree
+from ffr_prep.solvers.separators import separated
 
 
 def assert_solves(A, positions, columns=3, rel=1e-9):
@@ -55,6 +57,29 @@ def test_unknowns_without_a_place_come_last():
     factor = cholesky(bordered, positions)
     assert set(factor.order[-6:]) == set(range(A.shape[0], A.shape[0] + 6))
     assert_solves(bordered, positions)
+
+
+@pytest.mark.parametrize("held", [[0], [3, 70, 71, 200], list(range(40, 60))])
+def test_unknowns_that_are_held_are_zero(held):
+    """And the others are those of the matrix without their rows and columns, which may be singular with them."""
+    A, positions = clamped("tet10", (5, 2, 2))
+    free = np.delete(np.arange(A.shape[0]), held)
+    whole = A.tolil()
+    whole[held, held] = -1.0
+    b = np.random.default_rng(0).normal(size=(A.shape[0], 2))
+    x = solve_cholesky(cholesky(sp.csr_array(whole), positions, held=np.array(held)), b)
+    assert not x[held].any()
+    np.testing.assert_allclose(
+        x[free], np.linalg.solve(A.toarray()[np.ix_(free, free)], b[free]), rtol=0, atol=1e-9 * np.abs(x).max()
+    )
+
+
+def test_a_factor_takes_little_more_than_its_lower_triangle():
+    A, positions = clamped("tet10", (12, 5, 4))
+    fronts = cholesky(A, positions).fronts
+    own, rest = np.diff(fronts.starts), np.diff(fronts.ends)
+    lower = (own * (own + 1) // 2 + own * rest).sum()
+    assert lower < fronts.panels.size < 1.05 * lower
 
 
 def test_graphs_that_fall_apart_when_cut():
@@ -114,13 +139,47 @@ def test_pieces_below_a_piece_precede_it_and_separate_its_halves():
 
 
 def test_the_separator_is_a_smallest_one():
-    """A comb of 20 points on a line, each touching the ten on the other side of the cut: the spine alone separates."""
+    """A comb of 20 points on a line, each touching the ten beyond the middle: one point of the spine parts it."""
     points = np.column_stack([np.arange(20.0), np.zeros((20, 2))])
     edges = sp.lil_array((20, 20))
     for spine, tooth in [(9, k) for k in range(10, 20)] + [(10, k) for k in range(9)]:
         edges[spine, tooth] = edges[tooth, spine] = 1
-    _, _, separator = _cut(points, sp.csr_array(edges), np.arange(20), np.full(20, -1))
-    np.testing.assert_array_equal(separator, [9, 10])
+    place = np.full(20, -1)
+    one, two, separator = _cut(points, sp.csr_array(edges), np.arange(20), place)
+    assert separator.tolist() in ([9], [10])
+    assert (place == -1).all()
+    np.testing.assert_array_equal(np.sort(np.concatenate([one, two, separator])), np.arange(20))
+
+
+@pytest.mark.parametrize("near", [0.1, 0.16, 0.3, 2.0])
+def test_no_separator_is_smaller(near):
+    """Random points that touch those near them: as SciPy's largest flow through points of capacity one counts."""
+    rng = np.random.default_rng(int(100 * near))
+    points = rng.random((150, 3)) * [2.0, 1.0, 0.2]
+    distances = np.linalg.norm(points[:, None] - points, axis=2)
+    graph = sp.csr_array((distances < near) & ~np.eye(150, dtype=bool))
+    ordered = np.argsort(points[:, 0])
+    one, two, separator = separated(graph.indptr, graph.indices, ordered, 40, 110, np.full(150, -1))
+    assert not graph[one][:, two].nnz
+    assert set(ordered[110:]) <= set(two) | set(separator)
+    touching = ordered[:40][graph[ordered[:40]][:, ordered[110:]].sum(axis=1) > 0]
+    fixed = np.setdiff1d(ordered[:40], touching)
+    assert len(separator) == _largest_flow(graph, fixed, touching, ordered[110:])
+
+
+def _largest_flow(graph, below, touching, above):
+    """From `below` and `touching` to `above`, with an entry and an exit of each point and one unit between them."""
+    count, many = graph.shape[0], 10**6
+    rows, columns = graph.nonzero()
+    through = np.full(count, 1)
+    through[below] = through[above] = many
+    start, stop = np.concatenate([below, touching]), above
+    ends = np.full(count, 2 * count), np.full(count, 2 * count + 1)
+    i = np.concatenate([np.arange(count), rows + count, ends[0][: start.size], stop + count])
+    j = np.concatenate([np.arange(count) + count, columns, start, ends[1][: stop.size]])
+    units = np.concatenate([through, np.full(rows.size + start.size + stop.size, many)])
+    arcs = sp.csr_array((units.astype(np.int32), (i, j)), shape=(2 * count + 2, 2 * count + 2))
+    return maximum_flow(sp.csr_matrix(arcs), 2 * count, 2 * count + 1).flow_value
 
 
 def test_a_matrix_that_is_not_positive_definite_is_refused():
