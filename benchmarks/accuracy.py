@@ -139,7 +139,7 @@ def resolved(name: str, scene: Scene, span: dict[str, float], count: int) -> Res
         return load_result(path)
     found = integrate(scene, **span, method=RK4(span["output_step"] / count), stabilisation=Projection(1e-12))
     path.parent.mkdir(parents=True, exist_ok=True)
-    save_result(path, found)
+    save_result(found, path)
     return found
 
 
@@ -197,9 +197,10 @@ def report(method: str, cases: Sequence[Case], variant: str) -> str:
     return summary(f"{method} {variant}", every)
 
 
-HEAD = (
-    f"{'':15}{'scenes':>7}{'pairs':>7}{'in %':>7}{'low %':>7}{'places %':>10}{'forces':>9}{'silent':>8}{'cost':>7}{'extra':>7}"
-    f"\n{'wanted':15}{'':7}{'':7}{'95':>7}{'0':>7}{'95':>10}{ACCURACY:9.1g}{'1':>8}{'3':>7}{'2':>7}"
+WORDS = ("scenes", "pairs", "in %", "low %", "places %", "forces", "silent", "cost", "extra")
+HEAD = "\n".join(
+    f"{name:15}" + "".join(f"{word:>9}" for word in words)
+    for name, words in (("", WORDS), ("wanted", ("", "", "95", "0", "95", f"{ACCURACY:g}", "1", "3", "2")))
 )
 
 
@@ -211,8 +212,8 @@ def summary(name: str, every: list[Found]) -> str:
     forces, silent = (max(getattr(found, of) for found in every) for of in ("forces", "silent"))
     cost, extra = (statistics.median(getattr(found, of) for found in every) for of in ("cost", "extra"))
     return (
-        f"{name:15}{len(every):7d}{pairs.size:7d}{100 * inside:7.1f}{100 * below:7.2f}{100 * reached:10.0f}{forces:9.1g}"
-        f"{silent:8.2f}{cost:7.2f}{extra:7.2f}"
+        f"{name:15}{len(every):9d}{pairs.size:9d}{100 * inside:9.1f}{100 * below:9.2f}{100 * reached:9.0f}{forces:9.1g}"
+        f"{silent:9.2f}{cost:9.2f}{extra:9.2f}"
     )
 
 

@@ -7,7 +7,7 @@ looked for that is short enough.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence, Set
+from collections.abc import Callable, Mapping, Sequence, Set
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -308,7 +308,7 @@ def _further(
 
 def _other(runs: _Runs, method: Any, count: int, say: Say) -> Beside:
     """The run with another step: about twice the step, or four times of a method of higher order, where elastic forces are
-    implicit and that is a part of a row, half of it otherwise; a tenth of the tolerance of a method that chooses its steps."""
+    implicit and that is part of a row, else half of it; with a tenth of the tolerance of a method that chooses its steps."""
     if method.controlled:
         tolerances = replace(method.tolerances, relative=method.tolerances.relative / 10)
         return Beside(runs.run(replace(method, tolerances=tolerances), progress=say), 10.0 ** (-1.0 / method.order))
