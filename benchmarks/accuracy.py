@@ -110,6 +110,8 @@ def examined(name: str, scene: Scene, case: Case, method: str) -> Found:
         more, worst = compared(checked, true)
         pairs, silent = [*pairs, *more], max(silent, worst)
         extras += [] if checked is None else [checked.attributes["effort"] - 1.0]
+    if not pairs:
+        raise InputError("its reference is no sharper than the runs")
     return Found(pairs, *kept(found, true), silent, found.attributes["effort"], max(extras, default=0.0))
 
 

@@ -130,13 +130,20 @@ def unbalanced_rotor() -> Scene:
 
 
 def servo_arm() -> Scene:
-    """A bar that a servo turns against the friction of its bearing, with a mass at its end."""
-    bar_ = bar("bar", 0.7, rectangle(0.01, 0.02), ALUMINIUM)
-    bodies = (Body("bar", bar_, damping=0.02), Body("mass", block("mass", 0.4, 0.04), position=(0.7, 0, 0)))
-    joints = (Joint("hinge", "revolute", "ground.O", "bar.a"), Joint("grip", "fixed", "bar.b", "mass.pin"))
+    """A hub that a servo turns against the friction of its bearing, with an elastic bar and a mass at its end."""
+    bodies = (
+        Body("hub", block("hub", 4.0, 0.1)),
+        Body("bar", bar("bar", 0.7, rectangle(0.01, 0.02), ALUMINIUM), damping=0.02),
+        Body("mass", block("mass", 0.4, 0.04), position=(0.7, 0, 0)),
+    )
+    joints = (
+        Joint("hinge", "revolute", "ground.O", "hub.pin"),
+        Joint("root", "fixed", "hub.pin", "bar.a"),
+        Joint("grip", "fixed", "bar.b", "mass.pin"),
+    )
     forces = (
-        Servo("servo", "hinge", target=formula("smooth(2.5 * t)"), kp=100.0, kd=6.0),
-        JointFriction("bearing", "hinge", coulomb=0.2, creep=0.05),
+        Servo("servo", "hinge", target=formula("smooth(2.5 * t)"), kp=300.0, kd=25.0),
+        JointFriction("bearing", "hinge", coulomb=0.5, creep=0.05),
     )
     return Scene(bodies, joints, forces=forces, ground=ORIGIN, gravity=GRAVITY)
 
