@@ -6,6 +6,8 @@ the twin (`ffr_dyn.integrators.ros2.Twin`), which keeps its amplitude: with R of
     s = max |R(h) - R(r h)| / (r^p - 1),    v = 1.5 max |R(h) - T(h)|,    error = max(s, v),
 
 over all rows and components of an output. The factor is for vibration that is resolved in part, where the twin errs, too.
+Steps up to twice as long that change an output by more than a tenth of its range, as where they jump over an impact, have no
+order yet: p is 1 then.
 
 For ROS3, whose twin is of lower order and has half the step,
 
@@ -36,6 +38,7 @@ ARM = 1e-6  # of the largest range of forces times that of positions, the same f
 IN_PART = 1.5  # of what a twin with the same step is off
 MIDDLE, FLOOR, WINDOW = 2.7, 2.5, 16  # of amplitudes beside a twin with half the step
 TWIN = 2  # order of twins
+FAR, NEXT = 0.1, 2.0  # of the range, by which a step up to so many times as long makes a difference of order one
 NOISE = (70 / 36) ** 0.5  # by which rows without relation are farther off the curve than they are large
 RATES = {"position": "velocity", "R": "v", "q": "q_dot"}
 CONSTANT = 1e-8  # of the size of a kind: a range below it is rounding, as of the rate of an even turn
@@ -87,16 +90,23 @@ def step_errors(run: Result, other: Beside | None, order: int, twins: Sequence[B
     twins : the finest first, which has the step of the run, or half of it for a method of higher order, and one with a longer
             step then, if there is one; () where vibration is not damped
     """
-    scales, found = ranges(run), {}
+    scales, found = ranges(run), dict[str, StepError]()
     for names in _batches(run, scales):
-        y, steps = _columns(run, names), np.zeros(len(names))
-        if other is not None:
-            steps = _apart(y, y.table, _columns(other.result, names).table) * abs(1.0 / (other.ratio**order - 1.0))
-        far, vibrations = _beside_twins(y, [(_columns(twin.result, names).table, twin.ratio) for twin in twins])
-        for name, step, off, vibration in zip(names, *(a.tolist() for a in (steps, far, vibrations)), strict=True):
-            error, scale = max(step, vibration), scales[name]
-            found[name] = StepError(error, error / scale if scale > 0 else 0.0, off > VIBRATION * step)
+        y, size = _columns(run, names), np.array([scales[name] for name in names])
+        between = np.zeros(len(names)) if other is None else _apart(y, y.table, _columns(other.result, names).table)
+        smooth, steps = (between, between) if other is None else _by_order(between, other.ratio, order, FAR * size)
+        off, vibrations = _beside_twins(y, [(_columns(twin.result, names).table, twin.ratio) for twin in twins])
+        errors = np.maximum(steps, vibrations)
+        shares = np.divide(errors, size, out=np.zeros(len(names)), where=size > 0)
+        numbers = (column.tolist() for column in (errors, shares, off > VIBRATION * smooth))
+        found |= {name: StepError(*of) for name, *of in zip(names, *numbers, strict=True)}
     return found
+
+
+def _by_order(between: Array, ratio: float, order: int, far: Array) -> tuple[Array, Array]:
+    """(O,) what runs differ by whose steps have this ratio, as an error of the order, and s."""
+    smooth: Array = between * abs(1.0 / (ratio**order - 1.0))
+    return smooth, np.where(between > far, between * abs(1.0 / (ratio - 1.0)), smooth) if ratio <= NEXT else smooth
 
 
 def _batches(run: Result, names: Iterable[str]) -> Iterator[list[str]]:

@@ -29,6 +29,17 @@ def test_an_error_of_the_order_of_the_method_is_told_exactly(order, ratio):
     assert not found.vibrates
 
 
+def test_steps_that_jump_over_an_impact_have_no_order():
+    """A bounce that comes at another time with each step."""
+
+    def bounced(at):
+        return np.where(at > TIME, 1.0 - TIME, 1.0 - at + 0.7 * (TIME - at))
+
+    run, other, true = (result(a_position=bounced(at)) for at in (0.60, 0.75, 0.45))
+    off = np.abs(run["a.position"] - true["a.position"]).max()
+    assert step_errors(run, Beside(other, 2.0), 2)["a.position"].error >= 0.9 * off
+
+
 def test_vibration_that_runs_damp_away_is_seen_beside_the_twin():
     smooth, vibration = np.sin(3 * TIME), 0.02 * np.cos(5000 * TIME)
     run, other, twin = result(a_force=smooth), result(a_force=smooth), result(a_force=smooth + vibration)
