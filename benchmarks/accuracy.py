@@ -112,7 +112,7 @@ def examined(name: str, scene: Scene, case: Case, method: str) -> Found:
         extras += [] if checked is None else [checked.attributes["effort"] - 1.0]
     if not pairs:
         raise InputError("its reference is no sharper than the runs")
-    return Found(pairs, *kept(found, true), silent, found.attributes["effort"], max(extras, default=0.0))
+    return Found(pairs, *kept(found, true), silent, found.attributes["effort"], statistics.fmean(extras or [0.0]))
 
 
 def given(scene: Scene, span: dict[str, float], method: str, count: int) -> Result | None:

@@ -41,6 +41,7 @@ MARGIN = 2.0  # by which a trial aims below the accuracy
 PROJECTED = (
     1e-8  # of the accuracy [m, -], that constraints are closed to: 1e-9 m moved forces by up to 1e-3 of their range
 )
+LONGER = 2.0  # of the step: the second twin of a method of higher order
 SURE = 2  # order that linearly implicit methods keep where elastic forces are stiff
 SLOW = 0.7  # a ringing output's error falls slower than the step to this power,
 IN_COMPANY = 1.4  # or to this one, if it is of vibration, where others ring
@@ -292,18 +293,17 @@ def _told(trial: _Trial, other: Any, *longer: Any) -> _Trial:
 
 
 def _further(
-    runs: _Runs, method: Any, count: int, earlier: Sequence[_Trial] | None = None
+    runs: _Runs, method: Any, count: int, earlier: Sequence[_Trial] = ()
 ) -> list[Callable[[Say], Beside | None]]:
     """What tells the error of a run beside its twin: the run with another step, and, beside a twin of half the step, one with
-    a longer step. In a search, where they are to cost less, those of the last trial if its step is not too far."""
-    near = next((one for one in reversed(earlier or ()) if one.twins and count <= _leap(method) * one.count), None)
+    a longer step; those of the last trial if its step is not too far."""
+    near = next((one for one in reversed(earlier) if one.twins and count <= _leap(method) * one.count), None)
     if near is not None:
         ratio = count / near.count
         known = [Beside(near.result, ratio), *(Beside(one.result, ratio * one.ratio) for one in near.twins[:1])]
         return [lambda say, one=one: one for one in known[: 1 if _share(method) == 1.0 else 2]]  # type: ignore[misc]
     others: list[Callable[[Say], Beside | None]] = [lambda say: _other(runs, method, count, say)]
-    longer = 2.0 if earlier is not None else 1.0
-    return [*others, lambda say: _twin(runs, method, longer, say)] if _share(method) == 0.5 else others
+    return [*others, lambda say: _twin(runs, method, LONGER, say)] if _share(method) == 0.5 else others
 
 
 def _other(runs: _Runs, method: Any, count: int, say: Say) -> Beside:
