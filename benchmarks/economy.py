@@ -107,13 +107,14 @@ class Row:
 
 
 def truth(scene: Scene, found: list[Economy], span: Span) -> Known:
-    """Everything on, with at least four times the steps of the finest model, known to a tenth of the least tolerance."""
+    """Everything on, with at least four times the steps of the finest model as far as an output step is divided, known to a
+    tenth of the least tolerance."""
     of, least = found[0].probe, np.min([one.limits for one in found], axis=0)
     ledger = Ledger(scene, span, of, lambda stage: None)
     parts = [one.choice for one in found[0].tried if one.what == "full model"]
     everything = parts[0] if parts else replace(full_model(found[0]), method="ros3")
     finest = max(one.choice.divisions for one in found)
-    return sharpened(ledger, everything, SHARP * least, 4 * finest, LONG)
+    return sharpened(ledger, everything, SHARP * least, min(4 * finest, ledger.policy.most_divisions), LONG)
 
 
 @dataclass(frozen=True)

@@ -168,9 +168,8 @@ def forward(
     stopwatch   : takes the time of the integrator's compiled loop, in all runs, which go on one after another then
     assembled   : what `assemble` made of the scene at `start`, for programs that run it more than once
 
-    The result's attribute "errors" has [error in its unit, error over range] of every output, "accuracy" says the worst in a
-    sentence, "effort" what all runs together took, in evaluations of the one that is kept. Notes tell what rings and which
-    rows are too coarse.
+    The result's attribute "errors" has [error in its unit, error over range] of every output, "accuracy" the worst in words,
+    "effort" the evaluations of all runs over those of the one kept. Notes tell what rings and which rows are too coarse.
 
     Raises InputError for a scene or settings that cannot be used, ComputationError when the run fails: with the time,
     the body or joint, the likely cause and what to change. Energy that no force or driver has put in is a failure.
