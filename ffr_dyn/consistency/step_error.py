@@ -124,7 +124,7 @@ def _batches(run: Result, names: Iterable[str]) -> Iterator[list[str]]:
 
 
 def _beside_twins(y: _Columns, twins: Sequence[tuple[Array, float]]) -> tuple[Array, Array]:
-    """(O,) how far the twin is off, and v, of each output."""
+    """(O,) the vibration that is seen beside the twin, and v, of each output."""
     if not twins:
         return np.zeros(len(y.names)), np.zeros(len(y.names))
     (fine, ratio), *longer = twins
@@ -137,8 +137,8 @@ def _beside_twins(y: _Columns, twins: Sequence[tuple[Array, float]]) -> tuple[Ar
     if rows <= 4:
         return near, near
     amplitude = _apart(y, _amplitudes(y.table[:rows]), _amplitudes(fine[:rows]))
-    v = np.clip(MIDDLE * np.sqrt(near * amplitude), near / FLOOR, near)
-    return v, v
+    seen = np.minimum(near, MIDDLE * np.sqrt(near * amplitude))
+    return seen, np.maximum(seen, near / FLOOR)
 
 
 def _extrapolated(coarse: Array, fine: Array, ratio: float) -> Array:
