@@ -328,9 +328,9 @@ def _share(method: Integrator) -> float | None:
 
 
 def _twin(runs: _Runs, method: Integrator, share: float, say: Say) -> Beside:
-    """With a share of the step."""
-    twin = Twin(share * method.step, lasting(runs.vibrations, method.step))
-    return Beside(runs.run(twin, progress=say), share)
+    """With a share of the step, and the damping of the scene over that."""
+    step = share * method.step
+    return Beside(runs.run(Twin(step, lasting(runs.vibrations, step)), progress=say), share)
 
 
 def _cost(assembled: Assembled, result: Result) -> float:
