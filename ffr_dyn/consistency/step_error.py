@@ -14,7 +14,7 @@ For ROS3, whose twin is of lower order and has half the step,
     v1 = min(max |R(h) - T(h/2)|, max |R(h) - E|)    too large where vibration is resolved, by its phase;
                                                      E of T(h/2) and T(r h/2) by the order of the twin
     v2 = largest difference of the amplitudes of R(h) and T(h/2)    too small where it is resolved in part
-    v = 2.7 sqrt(v1 v2), but within v1/2.5 and v1
+    v = 2.7 sqrt(v1 v2), but within v1/3 and v1
 
 with amplitudes of what rows are off the curve through their neighbours, over windows of 16 rows: vibration that is not
 resolved looks like noise there. It tells nothing of what vibration does to slow motion, hence the lower limit. Stiff elastic
@@ -36,7 +36,7 @@ VIBRATION = 4.5  # v over s beyond which a difference is vibration that the step
 LITTLE = 1e-3  # of the largest range of its kind: an output that moves by less counts as if it moved by this
 ARM = 1e-6  # of the largest range of forces times that of positions, the same for moments
 IN_PART = 1.5  # of what a twin with the same step is off
-MIDDLE, FLOOR, WINDOW = 2.7, 2.5, 16  # of amplitudes beside a twin with half the step
+MIDDLE, FLOOR, WINDOW = 2.7, 3.0, 16  # of amplitudes beside a twin with half the step
 TWIN = 2  # order of twins
 FAR, NEXT = 0.1, 2.0  # of the range, by which a step up to so many times as long makes a difference of order one
 NOISE = (70 / 36) ** 0.5  # by which rows without relation are farther off the curve than they are large
