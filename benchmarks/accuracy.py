@@ -31,6 +31,7 @@ import numpy as np
 from ffr_gallery.scene_set import CASES, Case
 
 from benchmarks.unseen import UNSEEN
+from ffr_dyn.analyses.checkpoint import fingerprint
 from ffr_dyn.analyses.forward import DRIVING, PLACES, forward
 from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.consistency.assemble import assemble
@@ -135,8 +136,10 @@ def reference(name: str, scene: Scene, span: dict[str, float], step: float) -> T
 
 
 def resolved(name: str, scene: Scene, span: dict[str, float], count: int) -> Result:
-    """With so many steps of RK4 to a row, kept for another time."""
-    path = KEPT / f"{name.replace(' ', '.')}.{count}.nc"
+    """With so many steps of RK4 to a row, kept for another time by what the scene compiles to."""
+    made = assemble(scene)
+    mark = fingerprint(made.system.model, made.x.tobytes(), made.v.tobytes(), *span.values())[:12]
+    path = KEPT / f"{name.replace(' ', '.')}.{count}.{mark}.nc"
     if path.exists():
         return load_result(path)
     found = integrate(scene, **span, method=RK4(span["output_step"] / count), stabilisation=Projection(1e-12))
