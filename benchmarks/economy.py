@@ -1,10 +1,11 @@
 """What `economise` finds for the benchmark set, against an exhaustive grid of models and against everything.
 
-    python -m benchmarks.economy [--no-grid | --statements] [case ...]
+    python -m benchmarks.economy [--no-grid | --statements] [--unseen] [case ...]
 
 First it prints whether what is said of a model is true: of verified ones whether they keep their tolerances within the error
 that the verification names, of those without verification whether they keep their tolerances; against everything with at
-least four times their steps, known to a tenth of the tolerance by convergence. `--statements` ends there.
+least four times their steps, known to a tenth of the tolerance by convergence. `--statements` ends there. `--unseen` takes
+the scenes of `benchmarks.unseen`, on which nothing was chosen.
 
 For every case and the tolerances 1e-2, 1e-3 and 1e-4 it prints: whether the true errors are within the tolerance; the
 processor time of the time loop of the chosen model; how many times as long other ways take:
@@ -37,8 +38,9 @@ from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
-from ffr_gallery.scene_set import CASES, Case, case
+from ffr_gallery.scene_set import CASES, Case
 
+from benchmarks.unseen import UNSEEN
 from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.analyses.run import run as whole_run
 from ffr_dyn.economy.cache import Ledger
@@ -105,13 +107,14 @@ class Row:
 
 
 def truth(scene: Scene, found: list[Economy], span: Span) -> Known:
-    """Everything on, with at least four times the steps of the finest model, known to a tenth of the least tolerance."""
+    """Everything on, with at least four times the steps of the finest model as far as an output step is divided, known to a
+    tenth of the least tolerance."""
     of, least = found[0].probe, np.min([one.limits for one in found], axis=0)
     ledger = Ledger(scene, span, of, lambda stage: None)
     parts = [one.choice for one in found[0].tried if one.what == "full model"]
     everything = parts[0] if parts else replace(full_model(found[0]), method="ros3")
     finest = max(one.choice.divisions for one in found)
-    return sharpened(ledger, everything, SHARP * least, 4 * finest, LONG)
+    return sharpened(ledger, everything, SHARP * least, min(4 * finest, ledger.policy.most_divisions), LONG)
 
 
 @dataclass(frozen=True)
@@ -432,8 +435,9 @@ def _searched(row: Row) -> float:
 
 
 def main() -> None:
-    names = [name for name in sys.argv[1:] if name not in ("--no-grid", "--statements")]
-    cases, rows = [case(name) for name in names] or CASES, []
+    names = [name for name in sys.argv[1:] if not name.startswith("--")]
+    listed = UNSEEN if "--unseen" in sys.argv else CASES
+    cases, rows = [case for case in listed if not names or case.name in names], []
     tell_statements(cases)
     if "--statements" in sys.argv:
         return

@@ -7,7 +7,7 @@ looked for that is short enough.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence, Set
+from collections.abc import Callable, Mapping, Sequence, Set
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -22,7 +22,7 @@ from ffr_dyn.analyses.rotating.periodic import periodically
 from ffr_dyn.analyses.settings import Settings
 from ffr_dyn.consistency.assemble import Assembled, assemble
 from ffr_dyn.consistency.quasi_static import quasi_static
-from ffr_dyn.consistency.step_error import StepError, step_errors, too_coarse
+from ffr_dyn.consistency.step_error import Beside, StepError, step_errors, too_coarse
 from ffr_dyn.consistency.unresolved import Vibrations, lasting, leading, vibrations
 from ffr_dyn.functions.stopwatch import Stopwatch
 from ffr_dyn.functions.together import Say, together
@@ -35,13 +35,16 @@ from ffr_dyn.results.result import Result
 from ffr_dyn.scene.scene import Scene
 from ffr_prep.common.errors import ComputationError, InputError
 
-FIRST, FINEST, LEAP = 4, 1024, 8  # steps to an output row: of the first trial, at most, and times more in the next one
+FIRST, FINEST = 4, 1024  # steps to an output row: of the first trial, and at most
+LEAP = {2: 16}  # times more in the next one at most, by order (others: 8): an earlier trial tells the error of the next
 MARGIN = 2.0  # by which a trial aims below the accuracy
 PROJECTED = (
     1e-8  # of the accuracy [m, -], that constraints are closed to: 1e-9 m moved forces by up to 1e-3 of their range
 )
-NEAR = {2: 4}  # times the step at most, by order (others: 2), of a run beside which the error of another is told
-SLOW = 0.7  # a ringing output's error falls slower than the step to this power
+LONGER = 2.0  # of the step: the second twin of a method of higher order
+SURE = 2  # order that linearly implicit methods keep where elastic forces are stiff
+SLOW = 0.7  # a ringing output's error falls slower than the step to this power,
+IN_COMPANY = 1.4  # or to this one, if it is of vibration, where others ring
 QUICK = 1e7  # microseconds of the further runs, by `_cost`, up to which they are made unasked
 
 Beginning = Literal["as-given", "quasi-static", "steady", "periodic"]  # the default and the others
@@ -99,6 +102,7 @@ class _Runs:
     output_step: float
     how: dict[str, Any]
     begin: Beginning
+    work: list[int] = field(default_factory=list)  # evaluations of each
 
     @cached_property
     def vibrations(self) -> Vibrations:
@@ -107,7 +111,9 @@ class _Runs:
 
     def run(self, method: Integrator, **more: Any) -> Result:
         """One run."""
-        return integrate(self.scene, method=method, assembled=self.assembled, **{**self.how, **more})
+        found = integrate(self.scene, method=method, assembled=self.assembled, **{**self.how, **more})
+        self.work.append(found.attributes["evaluations"])
+        return found
 
     def together(self, calls: Sequence[Callable[[Say], Any]], leader: bool) -> list[Any]:
         """What runs return, or the exceptions that they raise; that of a leader, the first, ends the others and is raised.
@@ -162,8 +168,8 @@ def forward(
     stopwatch   : takes the time of the integrator's compiled loop, in all runs, which go on one after another then
     assembled   : what `assemble` made of the scene at `start`, for programs that run it more than once
 
-    The result's attribute "errors" has [error in its unit, error over range] of every output, "accuracy" says the worst in a
-    sentence. Notes tell what rings and which rows are too coarse.
+    The result's attribute "errors" has [error in its unit, error over range] of every output, "accuracy" the worst in words,
+    "effort" the evaluations of all runs over those of the one kept. Notes tell what rings and which rows are too coarse.
 
     Raises InputError for a scene or settings that cannot be used, ComputationError when the run fails: with the time,
     the body or joint, the likely cause and what to change. Energy that no force or driver has put in is a failure.
@@ -230,19 +236,19 @@ class _Trial:
     method: Integrator
     count: int  # steps to an output row
     result: Result
-    twins: tuple[Result, ...] = ()
+    twins: tuple[Beside, ...] = ()
     errors: Mapping[str, StepError] = field(default_factory=dict)
 
 
 def _checked(
     runs: _Runs, method: Integrator, count: int, kept: Mapping[str, Any], result: Result | None = None
 ) -> _Trial:
-    """A run, unless it is there already, with its twins and a run of another step, and what they tell of its errors."""
-    trial, more = _with_twins(runs, method, count, kept, result, [lambda say: _other(runs, method, count, {}, say)])
-    return _told(trial, more[0])
+    """A run, unless it is there already, with all that tells its errors."""
+    trial, more = _with_twin(runs, method, count, kept, result, _further(runs, method, count))
+    return _told(trial, *more)
 
 
-def _with_twins(
+def _with_twin(
     runs: _Runs,
     method: Integrator,
     count: int,
@@ -250,22 +256,18 @@ def _with_twins(
     result: Result | None = None,
     more: Sequence[Callable[[Say], Any]] = (),
 ) -> tuple[_Trial, list[Any]]:
-    """A run, unless it is there already, beside its twins, with what they tell of its errors; and what `more` returned.
+    """A run, unless it is there already, beside its twin, with what that tells of its errors; and what `more` returned.
 
-    Raises what the run itself raises; where twins fail there are none.
+    Raises what the run itself raises; where the twin fails there are no errors.
     """
-    try:
-        twins = [lambda say, twin=twin: runs.run(twin, progress=say) for twin in _twins(runs, method)]  # type: ignore[misc]
-    except ComputationError:
-        twins = []
+    twin = [] if (share := _share(method)) is None else [lambda say: _twin(runs, method, share, say)]
     own = [] if result is not None else [lambda say: runs.run(method, **kept, progress=say)]
-    outcomes = runs.together([*own, *twins, *more], leader=result is None)
+    outcomes = runs.together([*own, *twin, *more], leader=result is None)
     result = outcomes.pop(0) if result is None else result
-    found, others = outcomes[: len(twins)], outcomes[len(twins) :]
-    trial = _Trial(method, count, result)
-    if not twins or any(_failed(one) for one in found):
-        return trial, others
-    return replace(trial, twins=tuple(found), errors=step_errors(result, None, 1.0, method.order, found)), others
+    found, others = outcomes[: len(twin)], outcomes[len(twin) :]
+    if not found or _failed(found[0]):
+        return _Trial(method, count, result), others
+    return _Trial(method, count, result, tuple(found), step_errors(result, None, SURE, found)), others
 
 
 def _granted(outcome: Any) -> Any:
@@ -280,38 +282,55 @@ def _failed(outcome: Any) -> bool:
     return isinstance(outcome, ComputationError) or _granted(outcome) is None
 
 
-def _told(trial: _Trial, other: Any) -> _Trial:
-    """The run with its errors, also by what `_other` returned."""
+def _told(trial: _Trial, other: Any, *longer: Any) -> _Trial:
+    """The run with its errors, also by what `_further` returned."""
     if _failed(other):
         return replace(trial, errors={})
-    result, ratio = other
-    return replace(trial, errors=step_errors(trial.result, result, ratio, trial.method.order, trial.twins))
+    order = trial.method.order if _share(trial.method) is None else SURE
+    twins = (*trial.twins, *(twin for twin in longer if not _failed(twin)))
+    return replace(trial, twins=twins, errors=step_errors(trial.result, other, order, twins))
 
 
-def _other(runs: _Runs, method: Any, count: int, known: Mapping[int, Result], say: Say) -> tuple[Result, float]:
-    """The run with another step, and the ratio of the steps: a longer step that was tried, or about twice the step, where
-    elastic forces are implicit and that is a part of a row, half of it otherwise; a tenth of the tolerance of a method that
-    chooses its steps."""
+def _further(
+    runs: _Runs, method: Any, count: int, earlier: Sequence[_Trial] = ()
+) -> list[Callable[[Say], Beside | None]]:
+    """What tells the error of a run beside its twin: the run with another step, and, beside a twin of half the step, one with
+    a longer step; those of the last trial if its step is not too far."""
+    near = next((one for one in reversed(earlier) if one.twins and count <= _leap(method) * one.count), None)
+    if near is not None:
+        ratio = count / near.count
+        known = [Beside(near.result, ratio), *(Beside(one.result, ratio * one.ratio) for one in near.twins[:1])]
+        return [lambda say, one=one: one for one in known[: 1 if _share(method) == 1.0 else 2]]  # type: ignore[misc]
+    others: list[Callable[[Say], Beside | None]] = [lambda say: _other(runs, method, count, say)]
+    return [*others, lambda say: _twin(runs, method, LONGER, say)] if _share(method) == 0.5 else others
+
+
+def _other(runs: _Runs, method: Any, count: int, say: Say) -> Beside:
+    """The run with another step: about twice the step, or four times of a method of higher order, where elastic forces are
+    implicit and that is part of a row, else half of it; with a tenth of the tolerance of a method that chooses its steps."""
     if method.controlled:
         tolerances = replace(method.tolerances, relative=method.tolerances.relative / 10)
-        return runs.run(replace(method, tolerances=tolerances), progress=say), 10.0 ** (-1.0 / method.order)
+        return Beside(runs.run(replace(method, tolerances=tolerances), progress=say), 10.0 ** (-1.0 / method.order))
     if method.implicit and count > 1:
-        fewer = max((one for one in known if count <= NEAR.get(method.order, 2) * one), default=(count + 1) // 2)
+        fewer = -(-count // (4 if method.order > SURE else 2))
         try:
-            coarse = known.get(fewer) or runs.run(replace(method, step=runs.output_step / fewer), progress=say)
-            return coarse, count / fewer
+            return Beside(runs.run(replace(method, step=runs.output_step / fewer), progress=say), count / fewer)
         except ComputationError:
             pass  # half the step is sure to run
-    return runs.run(replace(method, step=runs.output_step / (2 * count)), progress=say), 0.5
+    return Beside(runs.run(replace(method, step=runs.output_step / (2 * count)), progress=say), 0.5)
 
 
-def _twins(runs: _Runs, method: Integrator) -> Iterator[Twin]:
-    """Of the step, and of half of it for a method of order three; none of methods that damp nothing the step allows."""
-    if method.implicit and not method.controlled:
-        rho = lasting(runs.vibrations, method.step)
-        yield Twin(method.step, rho)
-        if method.order > 2:
-            yield Twin(method.step / 2, rho)
+def _share(method: Integrator) -> float | None:
+    """Of the step, which the twin of a run has; None of methods that damp nothing the step allows."""
+    if not method.implicit or method.controlled:
+        return None
+    return 1.0 if method.order <= SURE else 0.5
+
+
+def _twin(runs: _Runs, method: Integrator, share: float, say: Say) -> Beside:
+    """With a share of the step, and the damping of the scene over that."""
+    step = share * method.step
+    return Beside(runs.run(Twin(step, lasting(runs.vibrations, step)), progress=say), share)
 
 
 def _cost(assembled: Assembled, result: Result) -> float:
@@ -322,11 +341,12 @@ def _cost(assembled: Assembled, result: Result) -> float:
 def _finished(runs: _Runs, trial: _Trial, path: str | Path | None, ringing: Set[str] = frozenset()) -> Result:
     """The result of a run with its errors, here and in its file; `ringing` outputs are told to be so."""
     result = trial.result
-    notes = [*result.attributes["notes"], *_unresolved(runs, trial, ringing), *_coarse(result)]
+    notes = [*result.attributes["notes"], *_unseen(trial), *_unresolved(runs, trial, ringing), *_coarse(result)]
     told = {name: [e.error, e.of_range] for name, e in trial.errors.items()}
     more: dict[str, Any] = {"notes": notes, "errors": told}
     if trial.errors:
         more["accuracy"] = _worst(trial.errors)
+        more["effort"] = sum(runs.work) / max(1, result.attributes["evaluations"])
     attributes = {**result.attributes, **more}
     if path is not None:
         with_attributes(path, attributes)
@@ -348,6 +368,15 @@ def _percent(share: float) -> str:
     return f"{100 * share:.2g} %"
 
 
+def _unseen(trial: _Trial) -> list[str]:
+    """A note where what the steps damp is not in the errors."""
+    if not trial.errors or trial.twins or _share(trial.method) is None:
+        return []
+    return [
+        "the error told leaves out vibration that the steps damp: the run that shows it has failed; take a smaller step"
+    ]
+
+
 def _unresolved(runs: _Runs, trial: _Trial, ringing: Set[str]) -> list[str]:
     """A note on the vibration that the step does not resolve: its share, its frequency, and the price of resolving it."""
     large = {name: e for name, e in trial.errors.items() if e.of_range > Within().accuracy}
@@ -356,7 +385,7 @@ def _unresolved(runs: _Runs, trial: _Trial, ringing: Set[str]) -> list[str]:
         return []
     of, method = runs.vibrations, trial.method
     name = max(told, key=lambda one: told[one].of_range)
-    found = leading(of, trial.result, trial.twins[-1])
+    found = leading(of, trial.result, trial.twins[0].result)
     words = f" of {found / 2 / np.pi:.4g} Hz" if found else ""
     step = (1.2 if of.ratio[-1] > 0 else 0.25) / of.omega[-1]
     times = (4 / step) / ((4 if method.order > 2 else 2) / method.step)
@@ -396,25 +425,28 @@ def _searched(runs: _Runs, within: Within, kept: dict[str, Any], count: int) -> 
     while True:
         method = stepped(within, runs.output_step / count)
         try:
-            trial, _ = _with_twins(runs, method, count, kept)
+            trial, _ = _with_twin(runs, method, count, kept)
         except (ComputationError, InputError):
             if count >= FINEST:
                 raise
-            count *= LEAP // 2
+            count *= FIRST
             continue
         if not trial.errors or _excess(trial, ringing, trials) <= within.accuracy:
-            known = {one.count: one.result for one in trials}
-            trial = _told(trial, *runs.together([lambda say: _other(runs, method, count, known, say)], leader=False))  # noqa: B023
+            trial = _told(trial, *runs.together(_further(runs, method, count, trials), leader=False))
         excess = _excess(trial, ringing, trials) / within.accuracy
         trials.append(trial)
         if excess <= 1.0 or count >= FINEST:
             return _finished(runs, trial, path, ringing)
-        count, kept = _next(count, excess), {**kept, "path": path, "resume": None}
+        count, kept = _next(count, excess, _leap(method)), {**kept, "path": path, "resume": None}
 
 
-def _next(count: int, excess: float) -> int:
-    """Steps to a row, an even number, at least twice as many; the run with half as many is the last one then."""
-    wanted = count * float(np.clip((MARGIN * excess) ** 0.5, 2.0, LEAP))
+def _leap(method: Integrator) -> int:
+    return LEAP.get(method.order, 8)
+
+
+def _next(count: int, excess: float, leap: int) -> int:
+    """Steps to a row, an even number, at least twice as many."""
+    wanted = count * float(np.clip((MARGIN * excess) ** 0.5, 2.0, leap))
     return min(FINEST, 2 * int(np.ceil(wanted / 2)))
 
 
@@ -424,8 +456,11 @@ def _excess(trial: _Trial, ringing: set[str], earlier: Sequence[_Trial]) -> floa
     if not trial.errors:
         return np.inf
     for before in (one for one in earlier[-1:] if one.errors):
-        slow = (trial.count / before.count) ** -SLOW
-        driving = (name for name in trial.errors if DRIVING.search(name))
-        ringing |= {name for name in driving if trial.errors[name].error > slow * before.errors[name].error}
+        driving = [name for name in trial.errors if DRIVING.search(name)]
+        left = {name: trial.errors[name].error / max(before.errors[name].error, 1e-300) for name in driving}
+        ringing |= {name for name in driving if left[name] > (trial.count / before.count) ** -SLOW}
+        if ringing:
+            vibrating = (name for name in driving if trial.errors[name].vibrates)
+            ringing |= {name for name in vibrating if left[name] > (trial.count / before.count) ** -IN_COMPANY}
     wanted = (name for name in trial.errors if PLACES.search(name) or DRIVING.search(name))
     return max((trial.errors[name].of_range for name in wanted if name not in ringing), default=0.0)

@@ -3,15 +3,23 @@
 Two runs that damp a vibration which neither resolves agree on the wrong curve, so that their difference tells nothing. Hence
 the twin (`ffr_dyn.integrators.ros2.Twin`), which keeps its amplitude: with R of the run, at steps h and r h, order p,
 
-    s = max |R(h) - R(r h)| / (r^p - 1),    v = max |R(h) - T(h)|,    error = max(s, v),
+    s = max |R(h) - R(r h)| / (r^p - 1),    v = 1.5 max |R(h) - T(h)|,    error = max(s, v),
 
-over all rows and components of an output. For ROS3, whose twin is of lower order, v = 2.2 sqrt(v1 v2):
+over all rows and components of an output. The factor is for vibration that is resolved in part, where the twin errs, too.
+Steps up to twice as long that change an output by more than a tenth of its range, as where they jump over an impact, have no
+order yet: p is 1 then.
 
-    v1 = min(max |R(h) - T(h/2)|, max |R(h) - (4 T(h/2) - T(h))/3|)    too large where vibration is resolved, by its phase
-    v2 = largest difference of the amplitudes of R(h) and T(h/2)       too small where it is resolved in part
+For ROS3, whose twin is of lower order and has half the step,
+
+    v1 = min(max |R(h) - T(h/2)|, max |R(h) - E|)    too large where vibration is resolved, by its phase;
+                                                     E of T(h/2) and T(r h/2) by the order of the twin
+    v2 = largest difference of the amplitudes of R(h) and T(h/2)    too small where it is resolved in part
+    v = 2.7 sqrt(v1 v2), but within v1/3 and v1
 
 with amplitudes of what rows are off the curve through their neighbours, over windows of 16 rows: vibration that is not
-resolved looks like noise there. The factor was measured on the benchmark set (`python -m benchmarks.accuracy`).
+resolved looks like noise there. It tells nothing of what vibration does to slow motion, hence the lower limit. Stiff elastic
+forces take ROS3 down to order two, which p is for it. The factors were measured on the benchmark set
+(`python -m benchmarks.accuracy`).
 """
 
 from __future__ import annotations
@@ -27,7 +35,10 @@ from ffr_prep.common.arrays import Array
 VIBRATION = 4.5  # v over s beyond which a difference is vibration that the step does not resolve
 LITTLE = 1e-3  # of the largest range of its kind: an output that moves by less counts as if it moved by this
 ARM = 1e-6  # of the largest range of forces times that of positions, the same for moments
-MIDDLE, WINDOW = 2.2 * 1.5**0.5, 16  # of amplitudes of methods of order three
+IN_PART = 1.5  # of what a twin with the same step is off
+MIDDLE, FLOOR, WINDOW = 2.7, 3.0, 16  # of amplitudes beside a twin with half the step
+TWIN = 2  # order of twins
+FAR, NEXT = 0.1, 2.0  # of the range, by which a step up to so many times as long makes a difference of order one
 NOISE = (70 / 36) ** 0.5  # by which rows without relation are farther off the curve than they are large
 RATES = {"position": "velocity", "R": "v", "q": "q_dot"}
 CONSTANT = 1e-7  # of the size of a kind: a range below it is rounding, as of the rate of an even turn
@@ -42,6 +53,14 @@ class StepError:
     error: float
     of_range: float
     vibrates: bool
+
+
+@dataclass(frozen=True)
+class Beside:
+    """Another run, and its step over that of the run that is looked at."""
+
+    result: Result
+    ratio: float
 
 
 @dataclass(frozen=True)
@@ -64,24 +83,30 @@ def _columns(run: Result, names: Iterable[str]) -> _Columns:
     return _Columns(known, first, np.concatenate([np.zeros((run.time.size, 0)), *parts], axis=1))
 
 
-def step_errors(
-    run: Result, other: Result | None, ratio: float, order: int, twins: Sequence[Result] = ()
-) -> dict[str, StepError]:
-    """The error of every output of a run with the step h.
+def step_errors(run: Result, other: Beside | None, order: int, twins: Sequence[Beside] = ()) -> dict[str, StepError]:
+    """The error of every output of a run.
 
-    other : the same with the step `ratio` h, None where the twins have told enough;  order : of the method
-    twins : of the step h, and of h/2 for a method of higher order; () where vibration is not damped
+    other : the same with another step, None where the twins have told enough;  order : that is sure of the method
+    twins : the finest first, which has the step of the run, or half of it for a method of higher order, and one with a longer
+            step then, if there is one; () where vibration is not damped
     """
-    scales, found = ranges(run), {}
+    scales, found = ranges(run), dict[str, StepError]()
     for names in _batches(run, scales):
-        y, steps = _columns(run, names), np.zeros(len(names))
-        if other is not None:
-            steps = _apart(y, y.table, _columns(other, names).table) * abs(1.0 / (ratio**order - 1.0))
-        vibrations = _beside_twins(y, [_columns(twin, names).table for twin in twins])
-        for name, step, vibration in zip(names, steps.tolist(), vibrations.tolist(), strict=True):
-            error, scale = max(step, vibration), scales[name]
-            found[name] = StepError(error, error / scale if scale > 0 else 0.0, vibration > VIBRATION * step)
+        y, size = _columns(run, names), np.array([scales[name] for name in names])
+        between = np.zeros(len(names)) if other is None else _apart(y, y.table, _columns(other.result, names).table)
+        smooth, steps = (between, between) if other is None else _by_order(between, other.ratio, order, FAR * size)
+        off, vibrations = _beside_twins(y, [(_columns(twin.result, names).table, twin.ratio) for twin in twins])
+        errors = np.maximum(steps, vibrations)
+        shares = np.divide(errors, size, out=np.zeros(len(names)), where=size > 0)
+        numbers = (column.tolist() for column in (errors, shares, off > VIBRATION * smooth))
+        found |= {name: StepError(*of) for name, *of in zip(names, *numbers, strict=True)}
     return found
+
+
+def _by_order(between: Array, ratio: float, order: int, far: Array) -> tuple[Array, Array]:
+    """(O,) what runs differ by whose steps have this ratio, as an error of the order, and s."""
+    smooth: Array = between * abs(1.0 / (ratio**order - 1.0))
+    return smooth, np.where(between > far, between * abs(1.0 / (ratio - 1.0)), smooth) if ratio <= NEXT else smooth
 
 
 def _batches(run: Result, names: Iterable[str]) -> Iterator[list[str]]:
@@ -98,19 +123,29 @@ def _batches(run: Result, names: Iterable[str]) -> Iterator[list[str]]:
         yield batch
 
 
-def _beside_twins(y: _Columns, twins: Sequence[Array]) -> Array:
-    """(O,) v of each output."""
-    if len(twins) < 2:
-        return _apart(y, y.table, twins[0]) if twins else np.zeros(len(y.names))
-    coarse, fine = twins
-    rows = min(len(coarse), len(fine))
-    extrapolated = (4.0 * fine[:rows] - coarse[:rows]) / 3.0
-    near = np.minimum(_apart(y, y.table, fine), _apart(y, y.table, extrapolated))
+def _beside_twins(y: _Columns, twins: Sequence[tuple[Array, float]]) -> tuple[Array, Array]:
+    """(O,) the vibration that is seen beside the twin, and v, of each output."""
+    if not twins:
+        return np.zeros(len(y.names)), np.zeros(len(y.names))
+    (fine, ratio), *longer = twins
+    near = _apart(y, y.table, fine)
+    if ratio == 1.0:
+        return near, IN_PART * near
+    for coarse, other in longer:
+        near = np.minimum(near, _apart(y, y.table, _extrapolated(coarse, fine, other / ratio)))
     rows = min(len(y.table), len(fine))
     if rows <= 4:
-        return near
+        return near, near
     amplitude = _apart(y, _amplitudes(y.table[:rows]), _amplitudes(fine[:rows]))
-    return np.minimum(near, MIDDLE * np.sqrt(near * amplitude))
+    seen = np.minimum(near, MIDDLE * np.sqrt(near * amplitude))
+    return seen, np.maximum(seen, near / FLOOR)
+
+
+def _extrapolated(coarse: Array, fine: Array, ratio: float) -> Array:
+    """Twins of two steps, without the error of their order."""
+    rows, weight = min(len(coarse), len(fine)), 1.0 / (ratio**TWIN - 1.0)
+    found: Array = fine[:rows] + weight * (fine[:rows] - coarse[:rows])
+    return found
 
 
 def _apart(of: _Columns, one: Array, other: Array) -> Array:
@@ -123,8 +158,7 @@ def _apart(of: _Columns, one: Array, other: Array) -> Array:
 
 def nearest(y: Array, coarse: Array, fine: Array) -> float:
     """v1 of a history, beside twins of h and of h/2: no smaller than the true error, too large by the phase of the twins."""
-    rows = min(len(coarse), len(fine))
-    return min(largest_difference(y, fine), largest_difference(y, (4.0 * fine[:rows] - coarse[:rows]) / 3.0))
+    return min(largest_difference(y, fine), largest_difference(y, _extrapolated(coarse, fine, 2.0)))
 
 
 def _amplitudes(y: Array) -> Array:

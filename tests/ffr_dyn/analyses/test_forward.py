@@ -13,7 +13,7 @@ from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.analyses.registry import summary
 from ffr_dyn.consistency.step_error import largest_difference, ranges
 from ffr_dyn.functions.formula import formula
-from ffr_dyn.integrators import RK4, ROS2, ROS3, AdaptiveROS3, Within, tolerances
+from ffr_dyn.integrators import RK4, ROS2, ROS3, AdaptiveROS3, Within, stepped, tolerances
 from ffr_dyn.integrators.stabilisation import Projection
 from ffr_dyn.results.file import load_result
 from ffr_dyn.scene.drivers import Driver
@@ -145,6 +145,29 @@ def test_a_search_that_was_stopped_goes_on(tmp_path):
     assert found.attributes["step"] == whole.attributes["step"]
     assert found["rod.q"].tobytes() == whole["rod.q"].tobytes()
     assert load_result(path)["rod.q"].tobytes() == whole["rod.q"].tobytes()
+
+
+@pytest.mark.parametrize("method", ["ros2", "ros3"])
+def test_a_search_costs_few_final_runs_and_says_how_many(method):
+    found = forward(driven(), **SPAN, method=Within(1e-3, method))
+    alone = forward(driven(), **SPAN, method=Within(1e-3, method), check=False)
+    assert 2.0 < found.attributes["effort"] == alone.attributes["effort"] < 4.0
+    step = found.attributes["step"]
+    given = forward(driven(), **SPAN, method=stepped(Within(1e-3, method), step), check=True)
+    assert 2.0 < given.attributes["effort"] < 3.5
+    assert "effort" not in forward(driven(), **SPAN, method=ROS2(1e-3), check=False).attributes
+
+
+def test_an_error_that_leaves_out_what_steps_damp_says_so(monkeypatch):
+    """As where the twin, which damps nothing, comes to no end."""
+
+    def failing(*_):
+        raise ComputationError("the energy has grown")
+
+    monkeypatch.setattr("ffr_dyn.analyses.forward._twin", failing)
+    found = forward(swinging(0.02), **SPAN, method=ROS2(1e-3), check=True)
+    assert found.attributes["errors"]
+    assert sum("leaves out vibration" in note for note in found.attributes["notes"]) == 1
 
 
 def test_a_check_can_be_left_out_or_asked_for():

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ffr_dyn.consistency.step_error import COARSE, ranges, step_errors, too_coarse
+from ffr_dyn.consistency.step_error import COARSE, IN_PART, Beside, ranges, step_errors, too_coarse
 from ffr_dyn.results.result import Quantity, Result
 
 TIME = np.linspace(0.0, 1.0, 201)
@@ -23,18 +23,29 @@ def test_an_error_of_the_order_of_the_method_is_told_exactly(order, ratio):
     true, shape = np.sin(3 * TIME), TIME**2
     h = 0.1
     run, other = (result(a_position=true + shape * step**order) for step in (h, ratio * h))
-    found = step_errors(run, other, ratio, order)["a.position"]
+    found = step_errors(run, Beside(other, ratio), order)["a.position"]
     assert found.error == pytest.approx(h**order, rel=1e-9)
     assert found.of_range == pytest.approx(h**order / np.ptp(true + shape * h**order), rel=1e-9)
     assert not found.vibrates
 
 
+def test_steps_that_jump_over_an_impact_have_no_order():
+    """A bounce that comes at another time with each step."""
+
+    def bounced(at):
+        return np.where(at > TIME, 1.0 - TIME, 1.0 - at + 0.7 * (TIME - at))
+
+    run, other, true = (result(a_position=bounced(at)) for at in (0.60, 0.75, 0.45))
+    off = np.abs(run["a.position"] - true["a.position"]).max()
+    assert step_errors(run, Beside(other, 2.0), 2)["a.position"].error >= 0.9 * off
+
+
 def test_vibration_that_runs_damp_away_is_seen_beside_the_twin():
     smooth, vibration = np.sin(3 * TIME), 0.02 * np.cos(5000 * TIME)
     run, other, twin = result(a_force=smooth), result(a_force=smooth), result(a_force=smooth + vibration)
-    assert step_errors(run, other, 2.0, 2)["a.force"].error == 0.0
-    found = step_errors(run, other, 2.0, 2, [twin])["a.force"]
-    assert found.error == pytest.approx(0.02, rel=1e-3)
+    assert step_errors(run, Beside(other, 2.0), 2)["a.force"].error == 0.0
+    found = step_errors(run, Beside(other, 2.0), 2, [Beside(twin, 1.0)])["a.force"]
+    assert found.error == pytest.approx(IN_PART * 0.02, rel=1e-3)
     assert found.vibrates
 
 
@@ -45,11 +56,26 @@ def test_the_phase_of_a_twin_of_lower_order_is_no_error_of_the_run():
         return np.sin(3 * TIME) + 0.1 * np.cos(2 * np.pi * 10 * TIME - phase * TIME)
 
     run, other = result(a_position=late(1e-3)), result(a_position=late(8e-3))
-    twins = [result(a_position=late(1.2)), result(a_position=late(0.3))]
-    near = step_errors(run, other, 2.0, 3, twins[1:])["a.position"].error
-    found = step_errors(run, other, 2.0, 3, twins)["a.position"].error
+    fine, coarse = Beside(result(a_position=late(0.3)), 0.5), Beside(result(a_position=late(1.2)), 1.0)
+    same = step_errors(run, None, 2, [Beside(fine.result, 1.0)])["a.position"].error / IN_PART
+    alone, both = (step_errors(run, Beside(other, 2.0), 3, t)["a.position"].error for t in ([fine], [fine, coarse]))
     true = np.abs(late(1e-3) - late(0.0)).max()
-    assert true <= found <= 0.3 * near
+    assert true <= both <= 0.3 * same
+    assert both <= alone <= same
+
+
+def test_what_vibration_does_to_slow_motion_is_not_left_out():
+    """A drift of energy that no row is off its neighbours by."""
+    run, twin = result(a_energy=-0.3 * TIME), result(a_energy=0 * TIME)
+    assert step_errors(run, None, 2, [Beside(twin, 0.5)])["a.energy"].error >= 0.3 / 3
+
+
+@pytest.mark.parametrize("ratio", [2.0, 8.0])
+def test_what_a_twin_errs_by_itself_goes_by_its_order(ratio):
+    smooth, h = np.sin(3 * TIME), 0.02
+    run = result(a_force=smooth)
+    twins = [Beside(result(a_force=smooth + (r * h) ** 2 * TIME), r) for r in (0.5, 0.5 * ratio)]
+    assert step_errors(run, None, 2, twins)["a.force"].error < 1e-12
 
 
 def test_outputs_that_hardly_move_are_measured_by_their_kind():
@@ -66,7 +92,7 @@ def test_violations_of_constraints_are_no_outputs_of_a_motion():
 
 def test_rows_beyond_the_end_of_another_run_are_not_compared():
     run, other = result(a_position=TIME), result(time=TIME[:-10], a_position=TIME[:-10])
-    assert step_errors(run, other, 2.0, 2)["a.position"].error == 0.0
+    assert step_errors(run, Beside(other, 2.0), 2)["a.position"].error == 0.0
 
 
 @pytest.mark.parametrize(("periods", "told"), [(2, False), (80, True)])
