@@ -5,7 +5,8 @@ from __future__ import annotations
 import stat
 import tomllib
 from collections.abc import Iterator
-from contextlib import contextmanager
+from codecs import BOM_UTF16_BE, BOM_UTF16_LE
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,7 @@ _ENDINGS = {
     ".toml": "a text such as a scene, which `ffr-dyn run` analyses",
     **dict.fromkeys((".step", ".stp", ".iges", ".igs", ".brep", ".geo"), _CAD),
 }
+_MARKS = (BOM_UTF16_LE, BOM_UTF16_BE)
 MANY = 50_000_000  # of numbers that are listed one by one
 
 
@@ -80,16 +82,16 @@ def check_ordinary(path: str | Path, what: str) -> None:
 
 
 def read_text(path: str | Path, what: str, most: int = _MOST_TEXT) -> str:
-    """A text in UTF-8, or in Latin-1 where it is not that."""
+    """A text in UTF-8, in UTF-16 where it begins with the mark of that, otherwise in Latin-1."""
     with reading(path, what):
         size = Path(path).stat().st_size
         if size > most:
             raise InputError(f"{path} has {size / 1e6:.0f} MB; {what} has at most {most / 1e6:.0f}")
         content = Path(path).read_bytes()
-        try:
-            return content.decode("utf-8-sig")
-        except UnicodeDecodeError:
-            return content.decode("latin-1")
+        for code in ("utf-16",) if content.startswith(_MARKS) else ("utf-8-sig", "latin-1"):
+            with suppress(UnicodeDecodeError):
+                return content.decode(code)
+        raise InputError(f"{path} begins as text in UTF-16 and is none; write it in UTF-8")
 
 
 def read_toml(path: str | Path, what: str) -> dict[str, Any]:
@@ -99,9 +101,12 @@ def read_toml(path: str | Path, what: str) -> dict[str, Any]:
         if len(text) > _MOST_TOML:
             raise InputError(f"{path} has {len(text) / 1e6:.0f} MB; {what} has at most {_MOST_TOML / 1e6:.0f}")
         try:
-            tree = tomllib.loads(text.decode("utf-8"))
-        except (tomllib.TOMLDecodeError, UnicodeDecodeError, ValueError) as error:  # numbers of too many digits
-            fault = f"is not a readable TOML file: {str(error)[:_SHOWN]}"
+            tree = tomllib.loads(text.decode("utf-16" if text.startswith(_MARKS) else "utf-8-sig"))
+        except (tomllib.TOMLDecodeError, ValueError) as error:  # numbers of too many digits
+            coded = isinstance(error, UnicodeDecodeError)
+            fault = (
+                "is not text in UTF-8; save it so" if coded else f"is not a readable TOML file: {str(error)[:_SHOWN]}"
+            )
             ours = what if Path(path).suffix.lower() != ".toml" else "a text"
             raise InputError(not_of_its_ending(path, ours, fault)) from None
         _check_tree(path, tree)
