@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import stat
 import tomllib
-from collections.abc import Iterator
 from codecs import BOM_UTF16_BE, BOM_UTF16_LE
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
