@@ -182,7 +182,7 @@ reduction = {method = "craig-bampton", modes = 2}
 [members.column]
 section = {shape = "rectangle", b = 0.02, h = 0.05}
 material = "steel"
-orientation = [0, 1, 0]
+orientation = [0, 0, 1]
 [[polylines]]
 member = "column"
 corners = [[0, 0, 0], [1, 0, 0], [1, 1, 0]]

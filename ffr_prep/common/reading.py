@@ -25,6 +25,7 @@ _ENDINGS = {
     **dict.fromkeys((".step", ".stp", ".iges", ".igs", ".brep", ".geo"), _CAD),
 }
 _MARKS = (BOM_UTF16_LE, BOM_UTF16_BE)
+_TOO_MANY_DIGITS = "int_max_str_digits"  # in a ValueError of Python for thousands of them
 MANY = 50_000_000  # of numbers that are listed one by one
 
 
@@ -47,7 +48,7 @@ def reading(path: str | Path, what: str, *damage: type[Exception]) -> Iterator[N
     except MemoryError:
         raise InputError(f"{path} announces more than fits in memory: is it {what}, and complete?") from None
     except Exception as error:
-        if "int_max_str_digits" in str(error):  # a ValueError of Python for thousands of digits
+        if _TOO_MANY_DIGITS in str(error):
             raise _too_large(path, what) from None
         why = " ".join(f"{type(error).__name__}: {error}".split())[:_SHOWN]
         if isinstance(error, damage):
@@ -102,7 +103,9 @@ def read_toml(path: str | Path, what: str) -> dict[str, Any]:
             raise InputError(f"{path} has {len(text) / 1e6:.0f} MB; {what} has at most {_MOST_TOML / 1e6:.0f}")
         try:
             tree = tomllib.loads(text.decode("utf-16" if text.startswith(_MARKS) else "utf-8-sig"))
-        except (tomllib.TOMLDecodeError, ValueError) as error:  # numbers of too many digits
+        except (tomllib.TOMLDecodeError, ValueError) as error:
+            if _TOO_MANY_DIGITS in str(error):
+                raise _too_large(path, what) from None
             coded = isinstance(error, UnicodeDecodeError)
             fault = (
                 "is not text in UTF-8; save it so" if coded else f"is not a readable TOML file: {str(error)[:_SHOWN]}"

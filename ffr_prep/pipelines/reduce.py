@@ -29,6 +29,7 @@ from ffr_prep.solvers.factor import CHOLESKY, FreeBody, Solver, SupportedBody, s
 from ffr_prep.solvers.threads import on_one_thread
 
 _MASSLESS = 1e-9
+_RIGID = 6  # coordinates of a body that does not deform
 UNDAMPED = Damping()
 
 
@@ -100,6 +101,11 @@ def reduce(
         )
     if request.parts is not None and model.cut is None:
         raise InputError("this model cannot be cut into parts: meshes of solids and frames of beams and plates can")
+    if model.coupled.K.shape[0] <= _RIGID:
+        raise InputError(
+            "every node of the model follows one rigid interface, so that nothing deforms: give it fewer nodes, make it a mean "
+            "one, or make a rigid body (ffr-prep rigid)"
+        )
     try:
         whole = _reduced(model, request, progress, advance)
         whole = replace(whole, parts=tuple(_parts(model, request, progress, advance)))

@@ -1,0 +1,40 @@
+"""Every message of ffr_prep has a remedy that works: what raises it, and the same mended as it says, which runs."""
+
+from __future__ import annotations
+
+import re
+from functools import cache
+
+import prep_command_cases
+import prep_model_cases
+import pytest
+from said import texts_of
+
+from ffr_prep.common.errors import ComputationError, InputError
+
+# What is a part of a message, or one made elsewhere.
+PARTS: dict[str, tuple[str, ...]] = {
+    "common/outputs.py": ("not_written", "_in_use"),
+    "common/reading.py": ("not_of_its_ending",),
+}
+CASES = prep_command_cases.CASES + prep_model_cases.CASES
+
+
+@cache
+def texts() -> dict[str, tuple[re.Pattern[str], ...]]:
+    return texts_of("ffr_prep", PARTS)
+
+
+@cache
+def message(number: int) -> str:
+    """What a case raises."""
+    with pytest.raises((InputError, ComputationError)) as caught:
+        CASES[number].raised()
+    return str(caught.value)
+
+
+@pytest.mark.parametrize("number", range(len(CASES)))
+def test_a_text_is_raised_and_its_remedy_works(number):
+    said = message(number)
+    assert any(text.search(said) for found in texts().values() for text in found), said
+    CASES[number].mended()
