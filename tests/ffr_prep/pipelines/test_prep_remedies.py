@@ -6,7 +6,10 @@ import re
 from functools import cache
 
 import prep_command_cases
+import prep_matrix_cases
+import prep_mesh_cases
 import prep_model_cases
+import prep_structure_cases
 import pytest
 from said import texts_of
 
@@ -17,7 +20,13 @@ PARTS: dict[str, tuple[str, ...]] = {
     "common/outputs.py": ("not_written", "_in_use"),
     "common/reading.py": ("not_of_its_ending",),
 }
-CASES = prep_command_cases.CASES + prep_model_cases.CASES
+CASES = (
+    prep_command_cases.CASES
+    + prep_model_cases.CASES
+    + prep_mesh_cases.CASES
+    + prep_structure_cases.CASES
+    + prep_matrix_cases.CASES
+)
 
 
 @cache

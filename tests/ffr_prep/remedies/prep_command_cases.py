@@ -114,10 +114,14 @@ FILES = [
     Case(lambda: plugged("1 / 0"), lambda: plugged(PLUGIN)),
     Case(lambda: registered(name="one"), registered),
     Case(
-        lambda: registered(Setting("count", float, 1.0, "How much.")), lambda: registered(Setting("count", int, 1, "How many."))
+        lambda: registered(Setting("count", float, 1.0, "How much.")),
+        lambda: registered(Setting("count", int, 1, "How many.")),
     ),
     *(Case(lambda unit=unit: to_si(3, unit, "m"), lambda: to_si(3, "mm", "m")) for unit in ("N", "mm+m", "metre")),
-    *(Case(lambda name=name: linked(name), lambda: linked("new.ffr")) for name in ("link.ffr", "folder.ffr", "pipe.ffr")),
+    *(
+        Case(lambda name=name: linked(name), lambda: linked("new.ffr"))
+        for name in ("link.ffr", "folder.ffr", "pipe.ffr")
+    ),
     words("mesh nowhere.inp", "mesh block.inp"),
     words("mesh .", "mesh block.inp"),
     words("mesh /dev/null", "mesh block.inp"),

@@ -8,11 +8,13 @@ from pathlib import Path
 
 import numpy as np
 from boxes import STEEL, box_mesh
+from matrix_models import rod
 from prep_remedy import box, edited, reduced, samples, with_files
 from said import Case
-from synthetic import cloud, mirrored
+from synthetic import cloud
 
 import ffr_prep as fp
+from ffr_prep.body import cut_names
 from ffr_prep.body.planar import in_plane
 from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.material import Rows, parse_material
@@ -87,7 +89,7 @@ def supports(count: int) -> fp.Supports:
 
 def on_nodes(value: float, count: int = 12) -> fp.UserConditions:
     rows = np.zeros((6, count, 3))
-    rows[range(6), [0, 0, 0, 3, 6, 6], [0, 1, 2, 0, 0, 1]] = value
+    rows[range(6), [0, 0, 0, 8, 8, 2], [0, 1, 2, 1, 2, 2]] = value
     return fp.UserConditions(rows)
 
 
@@ -106,7 +108,10 @@ CONDITIONS = [
     Case(p(InterfaceRegion, "a", kind="stiff"), p(InterfaceRegion, "a", kind="mean")),
     Case(p(InterfaceRegion, "a", point=(0, 0)), p(InterfaceRegion, "a", point=(0, 0, 0))),
     Case(p(held, fp.FixedTo("lift")), p(held, fp.FixedTo("left"))),
-    Case(p(solids, LEFT, InterfaceRegion("side", "left", "mean")), p(solids, LEFT, InterfaceRegion("side", "right", "mean"))),
+    Case(
+        p(solids, LEFT, InterfaceRegion("side", "left", "mean")),
+        p(solids, LEFT, InterfaceRegion("side", "right", "mean")),
+    ),
     Case(p(solids, "left"), p(solids, LEFT)),
     Case(p(solids, LEFT, LEFT), p(solids, LEFT, RIGHT)),
     Case(p(held, supports(5)), p(held, supports(6))),
@@ -115,7 +120,7 @@ CONDITIONS = [
     Case(p(held, on_nodes(np.nan)), p(held, on_nodes(1.0))),
     Case(p(fp.CutPlane, (0, 0), (1, 0, 0)), p(fp.CutPlane, (0, 0, 0), (1, 0, 0))),
     *(Case(p(cut, parts), HALVES) for parts in (1, "two", [0.7, 0.3], 9)),
-    Case(p(cut, 2, InterfaceRegion("cut1-", "left")), HALVES),
+    Case(p(cut, 2, InterfaceRegion(cut_names(1)[0], "left")), HALVES),
     Case(p(cut, [PLANE, fp.CutPlane((0.52, 0, 0), (1, 0, 0))]), p(cut, [PLANE])),
     Case(p(cut, 2, InterfaceRegion("side", "front", "mean")), p(cut, 2, RIGHT)),
     Case(p(fp.Request, name="a", reference="mean", reduction=fp.Guyan()), p(held, fp.MeanAxis())),
@@ -142,12 +147,11 @@ REDUCTIONS = [
     Case(p(fp.Krylov, 0), p(by, fp.Krylov(1))),
     Case(p(fp.Krylov, 1, ()), p(by, fp.Krylov(1))),
     Case(p(by, fp.Krylov(9)), p(by, fp.Krylov(1))),
-    Case(fp.Union, p(fp.Union, fp.Guyan())),
+    Case(p(fp.Union, ()), p(fp.Union, (fp.Guyan(),))),
     Case(p(by, vectors(1.0, 5)), p(by, vectors(1.0))),
     Case(p(by, vectors(np.inf)), p(by, vectors(1.0))),
     Case(p(by, vectors(0.0)), p(by, vectors(1.0))),
     Case(p(by, fp.CraigBampton(999)), p(by, fp.CraigBampton(3))),
-    Case(p(by, fp.CraigBampton(fp.UpTo(1e9))), p(by, fp.CraigBampton(fp.UpTo(3000.0)))),
     Case(p(fp.Band, 10.0, 1.0), p(fp.Band, 1.0, 10.0)),
     Case(p(fp.UpTo, 0.0), p(fp.UpTo, 10.0)),
     Case(p(fp.Accuracy, fp.Band(1, 2), 2.0), p(fp.Accuracy, fp.Band(1, 2), 0.1)),
@@ -175,7 +179,9 @@ APART = fp.Mesh(
     {},
     {},
 )
-NODES = replace(box(), node_groups={"edge": np.array([0, 1]), "line": np.array([0, 4, 8]), "face": np.array([0, 1, 2, 3])})
+NODES = replace(
+    box(), node_groups={"edge": np.array([0, 1]), "line": np.array([0, 4, 8]), "face": np.array([0, 1, 2, 3])}
+)
 OF_ONE = {"body": STEEL}
 SOLIDS = [
     Case(p(fp.from_mesh, FLAT, STEEL), p(fp.from_mesh, box(), STEEL)),
@@ -240,6 +246,11 @@ def bare(_: object) -> fp.FlexibleBody:
 
 
 SOUND = p(loaded, dict)
+TOP = p(region_triangles, box(), PLATE, "top")
+ROD = fp.reduce(
+    fp.from_frame(rod(fp.rectangle(0.02, 0.05), 1.0, 4)),
+    fp.Request(name="rod", reference=fp.MeanAxis(), reduction=fp.Eigenmodes(4), linear=True),
+)
 SECOND = reduced(LEFT, RIGHT, linear=False)
 BODIES = [
     Case(p(rigid, -1.0), rigid),
@@ -270,7 +281,8 @@ BODIES = [
     Case(p(replace, CLOUD, PP_dm=CLOUD.PP_dm[[1, 2, 0]][:, [1, 0, 2]]), p(replace, CLOUD, PP_dm=CLOUD.PP_dm)),
     Case(lambda: CLOUD.interface("d"), lambda: CLOUD.interface("a")),
     Case(
-        p(replace, PLATE.surface, triangles=PLATE.surface.triangles + 9), p(replace, PLATE.surface, points=PLATE.surface.points)
+        p(replace, PLATE.surface, triangles=PLATE.surface.triangles + 9),
+        p(replace, PLATE.surface, points=PLATE.surface.points),
     ),
     Case(
         p(replace, PLATE.surface, moduli=np.ones((len(PLATE.surface.points), 2))),
@@ -280,21 +292,25 @@ BODIES = [
         lambda: with_files(lambda: fp.save_body(replace(CLOUD, provenance={"by": {1, 2}}), Path("a.ffr")), {}),
         lambda: with_files(lambda: fp.save_body(replace(CLOUD, provenance={"by": [1, 2]}), Path("a.ffr")), {}),
     ),
-    Case(p(in_plane, mirrored(4, 1), (0, 0)), p(in_plane, mirrored(4, 1), (0, 0, 1))),
-    Case(p(in_plane, CLOUD), p(in_plane, mirrored(4, 1))),
+    Case(p(in_plane, ROD, (0, 0)), p(in_plane, ROD, (0, 0, 1))),
+    Case(p(in_plane, CLOUD), p(in_plane, ROD)),
+    Case(p(in_plane, fp.truncated(ROD, [0])), p(in_plane, ROD)),
     Case(p(fp.mean_axis_form, PLATE), p(fp.mean_axis_form, SECOND)),
     Case(p(integral, CLOUD, "I11"), p(integral, CLOUD, "I1")),
     Case(p(chosen, ["I11"]), p(chosen, ["I1"])),
-    Case(p(mode_pictures, CLOUD, "/tmp"), p(region_triangles, PLATE, box(), "top")),
-    Case(p(mode_pictures, PLATE, "/tmp", modes=[9]), p(region_triangles, PLATE, box(), "top")),
-    Case(p(mode_pictures, PLATE, "/tmp", modes=[1], scale=0.0), p(region_triangles, PLATE, box(), "top")),
+    Case(p(mode_pictures, replace(CLOUD, surface=None), "/tmp"), TOP),
+    Case(p(mode_pictures, PLATE, "/tmp", modes=[9]), TOP),
+    Case(p(mode_pictures, PLATE, "/tmp", modes=[1], scale=0.0), TOP),
     Case(p(quality_pictures, PLATE, "/tmp"), p(reduced, LEFT, quality=fp.Band(1.0, 20.0))),
-    Case(p(region_triangles, CLOUD, box(), "top"), p(region_triangles, PLATE, box(), "top")),
-    Case(p(region_triangles, PLATE, long(), "top"), p(region_triangles, PLATE, box(), "top")),
-    Case(lambda: with_files(lambda: fp.rigid_part("block.inp", -1.0), {}), lambda: with_files(lambda: fp.rigid_part("block.inp", 1e3), {})),
+    Case(p(region_triangles, box(), CLOUD, "top"), TOP),
+    Case(p(region_triangles, long(), PLATE, "top"), TOP),
     Case(
-        lambda: with_files(lambda: fp.rigid_part("block.inp", 1e3, [InterfaceRegion("LEFT")] * 2), {}),
-        lambda: with_files(lambda: fp.rigid_part("block.inp", 1e3, [InterfaceRegion("LEFT")]), {}),
+        lambda: with_files(lambda: fp.rigid_part("block.inp", -1.0), {}),
+        lambda: with_files(lambda: fp.rigid_part("block.inp", 1e3), {}),
+    ),
+    Case(
+        lambda: with_files(lambda: fp.rigid_part("block.inp", 1e3, [InterfaceRegion("patch_1")] * 2), {}),
+        lambda: with_files(lambda: fp.rigid_part("block.inp", 1e3, [InterfaceRegion("patch_1")]), {}),
     ),
 ]
 

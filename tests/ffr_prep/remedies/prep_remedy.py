@@ -79,7 +79,9 @@ def _commands(lines: tuple[str, ...]) -> None:
 
 def command(*lines: str, **changes: str) -> object:
     """Run commands of ffr-prep beside the samples and files given by their names, "_" for the dot."""
-    return with_files(partial(_commands, lines), {name.replace("_", "."): (("", text),) for name, text in changes.items()})
+    return with_files(
+        partial(_commands, lines), {name.replace("_", "."): (("", text),) for name, text in changes.items()}
+    )
 
 
 def words(wrong: str, right: str, **files: str) -> Case:
@@ -92,9 +94,7 @@ def edited(read: Callable[[Path], object], name: str, *changes: Change) -> Case:
     return rewritten(read, name, changes, ())
 
 
-def rewritten(
-    read: Callable[[Path], object], name: str, wrong: tuple[Change, ...], right: tuple[Change, ...]
-) -> Case:
+def rewritten(read: Callable[[Path], object], name: str, wrong: tuple[Change, ...], right: tuple[Change, ...]) -> Case:
     """A sample changed so that it cannot be read, and so that it can."""
     return Case(
         partial(with_files, lambda: read(Path(name)), {name: wrong}),
@@ -103,6 +103,7 @@ def rewritten(
 
 
 # ---- bodies and models --------------------------------------------------------------------------------------------------
+
 
 @cache
 def box(kind: str = "hex8", cells: tuple[int, int, int] = (2, 1, 1)) -> Mesh:
