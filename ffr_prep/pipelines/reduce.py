@@ -103,8 +103,8 @@ def reduce(
         raise InputError("this model cannot be cut into parts: meshes of solids and frames of beams and plates can")
     if model.coupled.K.shape[0] <= _RIGID:
         raise InputError(
-            "every node of the model follows one rigid interface, so that nothing deforms: give it fewer nodes, make it a mean "
-            "one, or make a rigid body (ffr-prep rigid)"
+            "every node of the model follows one rigid interface, so that nothing deforms: give it fewer nodes, make it a "
+            "mean one, or make a rigid body (ffr-prep rigid)"
         )
     try:
         whole = _reduced(model, request, progress, advance)

@@ -39,7 +39,7 @@ TWO = np.vstack([PLAIN.points, PLAIN.points + 3])
 SEAM = np.vstack([PLAIN.points, PLAIN.points[4:8]])
 OPENED = HEX.copy()
 OPENED[1] = np.where((HEX[1] >= 4) & (HEX[1] < 8), HEX[1] + 8, HEX[1])
-HINGED = np.vstack([PLAIN.points, PLAIN.points + [1.0, 0.2, 0.1]])
+HINGED = np.vstack([PLAIN.points, PLAIN.points + np.array((1.0, 0.2, 0.1))])
 AT_CORNER = np.where(HEX + 12 == 12, 11, HEX + 12)
 MESHES = [
     changed(blocks=()),
@@ -53,7 +53,7 @@ MESHES = [
     changed(points=PLAIN.points * [1, 1, -1]),
     changed(points=SEAM, blocks=blocks(OPENED)),
     changed(points=TWO, blocks=blocks(np.vstack([HEX, HEX + 12]))),
-    changed(points=np.delete(HINGED, 12, axis=0), blocks=blocks(np.vstack([HEX, np.where(AT_CORNER > 12, AT_CORNER - 1, AT_CORNER)]))),
+    changed(points=np.delete(HINGED, 12, axis=0), blocks=blocks(np.vstack([HEX, AT_CORNER - (AT_CORNER > 12)]))),
 ]  # fmt: skip
 
 
@@ -88,6 +88,7 @@ REQUESTS = [
     Case(p(mesh, most_elements=0.0), mesh),
     Case(p(limited, -1.0), p(limited, 600.0)),
 ]
+FRD_HEAD = f"    2C{4:30}{1:38}"
 DECKS = [
     of("block.inp", ("*NODE", "*NGEN\n1, 3, 1\n*NODE")),
     of("block.inp", ("*NODE", "*NODE, SYSTEM=C")),
@@ -114,7 +115,7 @@ DECKS = [
     of("fields.bdf", (",1.,0.,0.\n", ",0.,0.,2.\n")),
     of("mesh.frd", (" -1         1 0.00000E+00", " -1         1 zero        ")),
     of("mesh.frd", (" -2         1", " -2         9")),
-    of("mesh.frd", ("    2C                             4                                     1", "    2C                             4                                     2")),
+    of("mesh.frd", (FRD_HEAD, FRD_HEAD[:-1] + "2")),
     of("mesh.frd", (" -1         1    3", " -1         1    2")),
     of("mesh.vtu", ("VTKFile", "VTK")),
 ]  # fmt: skip

@@ -136,7 +136,7 @@ def by(reduction: object, *interfaces: InterfaceRegion, **more: object) -> fp.Fl
 
 def vectors(value: float, count: int = 28) -> fp.UserVectors:
     given = np.zeros((count, 3, 1))
-    given[:, 1, 0] = value * (np.arange(count) == 13)
+    given[13 % count, 1, 0] = value
     return fp.UserVectors(given)
 
 
