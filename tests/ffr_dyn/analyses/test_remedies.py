@@ -26,8 +26,8 @@ import result_cases
 import scene_cases
 import study_cases
 from ffr_gallery.bodies import bar
-from remedy import CLOUD, DOUBLE, DRIVEN, GROUND, HINGED, TURNING, Case, run
-from said import texts_of
+from remedy import CLOUD, DOUBLE, DRIVEN, GROUND, HINGED, TURNING, run
+from said import Case, texts_of
 from synthetic import cloud
 from test_analyses_inverse import flexible_arm
 from test_analyses_kinematic import slider_crank

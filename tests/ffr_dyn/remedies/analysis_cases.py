@@ -14,7 +14,8 @@ from unittest.mock import patch
 import h5py
 import numpy as np
 from ffr_gallery.bodies import bar, beam
-from remedy import CLOUD, DOUBLE, DRIVEN, GROUND, HINGED, Case, run
+from remedy import CLOUD, DOUBLE, DRIVEN, GROUND, HINGED, run
+from said import Case
 from synthetic import cloud
 from test_analyses_kinematic import slider_crank
 from test_analyses_mixed import (

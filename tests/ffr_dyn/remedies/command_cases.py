@@ -11,7 +11,8 @@ from tempfile import TemporaryDirectory
 from unittest.mock import patch
 
 import numpy as np
-from remedy import CLOUD, DRIVEN, DRIVER, HINGED, SCENE, Case, command
+from remedy import CLOUD, DRIVEN, DRIVER, HINGED, SCENE, command
+from said import Case
 from test_parts_command import CLAMPED, STRIP
 
 import ffr_dyn as fd
