@@ -63,7 +63,7 @@ def reduce_structure_command(structure: Path, output: Path, **options: Any) -> N
     from ffr_prep.pipelines.structure_file import geometry_files, read_structure
 
     solver = solver_of(options)
-    reserve("-o", output)
+    reserve("-o", output, usual=".ffr")
     tell_of_programs(geometry_files(structure))
     steps = terminal_steps()
     loaded = read_structure(structure, steps)

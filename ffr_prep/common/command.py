@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import sys
 from collections.abc import Sequence
@@ -13,6 +14,7 @@ import click
 from ffr_prep.common.errors import ComputationError, InputError
 from ffr_prep.common.interrupts import ending_in_order, ignore_further
 from ffr_prep.common.outputs import command_inputs, note_input, reserved
+from ffr_prep.common.reading import ENDINGS, TOO_MANY_DIGITS
 
 
 class InputPath(click.Path):
@@ -27,17 +29,32 @@ class InputPath(click.Path):
         return path
 
 
+class FiniteRange(click.FloatRange):
+    """A number between limits; not-a-number, which no comparison catches, is none."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        number = super().convert(value, param, ctx)
+        if not math.isfinite(number):
+            self.fail(f"{value} is not a finite number.", param, ctx)
+        return number
+
+
 INPUT_FILE = InputPath()
 OUTPUT_FILE = click.Path(path_type=Path)
 
 
-def reserve(option: str, path: Path | None, suffixes: Sequence[str] = ()) -> None:
+def reserve(option: str, path: Path | None, suffixes: Sequence[str] = (), usual: str = "") -> None:
     """Before the work, not after it: InputError for a file that could not be written, or not in a known format.
 
+    usual : ending of what is written where any is allowed but those of other kinds of files, one of which would be lost
     Until the command ends no other one writes to it.
     """
     if path is None:
         return
+    if usual not in ("", path.suffix.lower()) and path.suffix.lower() in ENDINGS:
+        raise InputError(
+            f"{option} {path}: by its ending this is {ENDINGS[path.suffix.lower()]}; what is written here ends in {usual}"
+        )
     if suffixes and path.suffix.lower() not in suffixes:
         raise InputError(
             f"{option} {path}: it is written as {' or '.join(suffixes)}, not {path.suffix or 'without a suffix'}"
@@ -89,6 +106,8 @@ def _last_words(program: str, error: Exception) -> tuple[str, int]:
     if isinstance(error, OSError):
         where = error.filename2 or error.filename or "file"
         return f"{os.fsdecode(where)}: {error.strerror or error}; choose another place", 2
+    if TOO_MANY_DIGITS in str(error):
+        return "a number has too many digits; give a smaller one", 2
     if isinstance(error, MemoryError):
         return "not enough memory: make the model smaller, such as by a coarser mesh", 1
     return f"{unforeseen(error)}; this is a mistake of the program: please report it, with what you gave it", 1

@@ -18,14 +18,16 @@ _DEEPEST = 40  # tables and lists within each other
 _LARGEST = 1 << 63
 _SHOWN = 200
 _CAD = "a CAD file, of which `ffr-prep reduce` makes a body"
-_ENDINGS = {
+_MESH = "a mesh, of which `ffr-prep reduce` makes a body"
+ENDINGS = {
     ".ffr": "a body file, which a scene names (file = ...) and `ffr-prep info` describes",
     ".nc": "a result file, which `ffr-dyn info`, `plot` and `animate` show",
     ".toml": "a text such as a scene, which `ffr-dyn run` analyses",
     **dict.fromkeys((".step", ".stp", ".iges", ".igs", ".brep", ".geo"), _CAD),
+    **dict.fromkeys((".inp", ".bdf", ".nas", ".msh", ".med", ".unv", ".vtu", ".frd"), _MESH),
 }
 _MARKS = (BOM_UTF16_LE, BOM_UTF16_BE)
-_TOO_MANY_DIGITS = "int_max_str_digits"  # in a ValueError of Python for thousands of them
+TOO_MANY_DIGITS = "int_max_str_digits"  # in a ValueError of Python for thousands of them
 MANY = 50_000_000  # of numbers that are listed one by one
 
 
@@ -48,7 +50,7 @@ def reading(path: str | Path, what: str, *damage: type[Exception]) -> Iterator[N
     except MemoryError:
         raise InputError(f"{path} announces more than fits in memory: is it {what}, and complete?") from None
     except Exception as error:
-        if _TOO_MANY_DIGITS in str(error):
+        if TOO_MANY_DIGITS in str(error):
             raise _too_large(path, what) from None
         why = " ".join(f"{type(error).__name__}: {error}".split())[:_SHOWN]
         if isinstance(error, damage):
@@ -64,7 +66,7 @@ def _too_large(path: str | Path, what: str) -> InputError:
 
 def not_of_its_ending(path: str | Path, what: str, fault: str) -> str:
     """Why a file cannot be read as `what`, a kind of file: for one whose ending is of another kind that, else the fault."""
-    kind = _ENDINGS.get(Path(path).suffix.lower(), what)
+    kind = ENDINGS.get(Path(path).suffix.lower(), what)
     return f"{path} {fault}" if kind.startswith(what) else f"{path} is not {what} but, by its ending, {kind}"
 
 
@@ -104,7 +106,7 @@ def read_toml(path: str | Path, what: str) -> dict[str, Any]:
         try:
             tree = tomllib.loads(text.decode("utf-16" if text.startswith(_MARKS) else "utf-8-sig"))
         except (tomllib.TOMLDecodeError, ValueError) as error:
-            if _TOO_MANY_DIGITS in str(error):
+            if TOO_MANY_DIGITS in str(error):
                 raise _too_large(path, what) from None
             coded = isinstance(error, UnicodeDecodeError)
             fault = (

@@ -85,6 +85,7 @@ def continued(settings: object) -> Result:
 
 LONGER = Settings(start=0.0, end=0.2, output_step=0.01, method=ROS2(1e-3))
 RESUMED = [
+    Case(p(run, DRIVEN, ROS2(1e-20)), p(run, DRIVEN, ROS2(1e-3))),
     Case(p(resumed, lambda content: content[:50]), p(run, DRIVEN, end=0.2)),
     Case(p(resumed, older), p(run, DRIVEN, end=0.2)),
     Case(p(continued, MomentSettings()), p(continued, LONGER)),

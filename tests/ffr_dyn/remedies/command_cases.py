@@ -107,6 +107,7 @@ COMMANDS = [
     ),
     Case(p(command, CHART, text=STATIC), chart),
     Case(p(charted, "clod"), p(charted, "cloud=swing.cloud.ffr")),
+    Case(p(command, "parts rod.toml"), p(parted, "reduce-structure strip.toml")),
     Case(p(parted, "reduce-structure far.toml"), p(parted, "reduce-structure strip.toml")),
     Case(p(command, CHART + " --end -1"), chart),
     Case(p(command, CHART.replace("1e-2", "0")), chart),

@@ -49,6 +49,8 @@ OPTIONS = [
     reduces("--parts two", "--modes 0 --parts 2"),
     reduces("--accuracy 10;20;3", "--modes 2"),
     reduces("--accuracy 10,20", "--frequency 2000"),
+    words("reduce block.inp --interface LEFT -o scene.toml", REDUCE),
+    words("faces block.inp --page page.png", "faces block.inp"),
     words("modes body.ffr -o block.inp", "info body.ffr"),
 ]
 

@@ -256,6 +256,7 @@ BODIES = [
     Case(p(rigid, -1.0), rigid),
     Case(p(rigid, 1.0, (1, 1)), rigid),
     Case(p(rigid, 1.0, (1, 1, 3)), rigid),
+    Case(p(rigid, 1e308), rigid),
     Case(p(fp.truncated, CLOUD, 4), p(fp.truncated, CLOUD, 3)),
     Case(p(fp.truncated, CLOUD, [0, 0]), p(fp.truncated, CLOUD, [0, 1])),
     Case(p(fp.with_point, rigid(), "a", (0, 0, 0)), p(fp.with_point, PLATE, "a", (0, 0, 0))),
