@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Set
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Self
@@ -105,6 +105,7 @@ class Journal:
 
     def __init__(self, path: str | Path, study: Study) -> None:
         self.rows: dict[int, Row] = {}
+        self._outputs = {one.name for one in study.outputs}
         self._path, begun = journal_of(path), {"study": mark(study), "runs": len(study.points)}
         sound = self._read(begun) if self._path.exists() else 0
         self._file = open(self._path, "r+b" if self._path.exists() else "w+b")  # noqa: SIM115 - held while runs end
@@ -119,15 +120,15 @@ class Journal:
         for k, line in enumerate(lines):
             try:
                 entry = json.loads(line)
-            except ValueError:
+                row = _row(entry, begun["runs"], self._outputs) if k else None
+            except (ValueError, TypeError, KeyError, AttributeError, RecursionError):  # damaged: done again from here
                 break
             if k == 0 and entry != begun:
                 raise InputError(
                     f"{self._path} is of another study, or of this one before it was changed: name another output, or remove "
                     "it to begin anew"
                 )
-            if k:
-                row = Row(int(entry["run"]), entry["values"], entry["message"])
+            if row is not None:
                 self.rows[row.number] = row
             sound += len(line) + 1
         return sound
@@ -153,6 +154,14 @@ class Journal:
 
     def __exit__(self, *_: object) -> None:
         self._file.close()
+
+
+def _row(entry: Mapping[str, Any], runs: int, outputs: Set[str]) -> Row:
+    """A line of the journal. Raises ValueError or KeyError for what no run of the study can have left."""
+    number, values = int(entry["run"]), {str(name): float(value) for name, value in entry["values"].items()}
+    if not (0 <= number < runs and values.keys() <= outputs):
+        raise ValueError(number)
+    return Row(number, values, str(entry["message"]))
 
 
 # ---- the file -------------------------------------------------------------------------------------------------------

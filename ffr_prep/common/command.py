@@ -51,10 +51,7 @@ def reserve(option: str, path: Path | None, suffixes: Sequence[str] = (), usual:
     """
     if path is None:
         return
-    if usual not in ("", path.suffix.lower()) and path.suffix.lower() in ENDINGS:
-        raise InputError(
-            f"{option} {path}: by its ending this is {ENDINGS[path.suffix.lower()]}; what is written here ends in {usual}"
-        )
+    check_ending(option, path, usual)
     if suffixes and path.suffix.lower() not in suffixes:
         raise InputError(
             f"{option} {path}: it is written as {' or '.join(suffixes)}, not {path.suffix or 'without a suffix'}"
@@ -66,6 +63,13 @@ def reserve(option: str, path: Path | None, suffixes: Sequence[str] = (), usual:
         click.get_current_context().with_resource(reserved(path))
     except InputError as error:
         raise InputError(f"{option} {error}") from None
+
+
+def check_ending(option: str, path: Path, usual: str) -> None:
+    """InputError for an output called like a file of another kind, which would be lost; usual : the ending it has, or ""."""
+    kind = ENDINGS.get(path.suffix.lower())
+    if kind is not None and usual not in ("", path.suffix.lower()):
+        raise InputError(f"{option} {path}: by its ending this is {kind}; what is written here ends in {usual}")
 
 
 def check_folder(option: str, path: Path) -> None:
