@@ -504,6 +504,8 @@ def read_many(name: str, seed: int, first: int, last: int, folder: Path) -> None
         target.unlink(missing_ok=True)
         target.write_bytes(mutated(samples[which], others[random.integers(len(others))], random))
         print(outcome(read, target), flush=True)
+        target.unlink(missing_ok=True)
+        target.symlink_to(folder / files[which])  # sound again, for those that are read with it
 
 
 # ---- from outside ---------------------------------------------------------------------------------------------------

@@ -202,7 +202,7 @@ def _range(name: str, given: Mapping[str, Any]) -> Axis:
         raise InputError(f"parameters.{name}: spacing is {spacing!r}; give linear or log")
     try:
         return spaced(float(given["from"]), float(given["to"]), int(given["count"]), logarithmic=spacing == "log")
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise InputError(f"parameters.{name}: {error}") from None
 
 

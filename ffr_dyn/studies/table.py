@@ -121,7 +121,14 @@ class Journal:
             try:
                 entry = json.loads(line)
                 row = _row(entry, begun["runs"], self._outputs) if k else None
-            except (ValueError, TypeError, KeyError, AttributeError, RecursionError):  # damaged: done again from here
+            except (
+                ValueError,
+                TypeError,
+                KeyError,
+                AttributeError,
+                OverflowError,
+                RecursionError,
+            ):  # damaged: done again from here
                 break
             if k == 0 and entry != begun:
                 raise InputError(
@@ -192,7 +199,7 @@ def load_table(path: str | Path) -> Table:
 
     >>> table = fd.load_table("study.nc")
     """
-    with reading(path, "the table of a study", OSError, KeyError):
+    with reading(path, "the table of a study", OSError, KeyError, AttributeError, TypeError, ValueError, RuntimeError):
         check_heaps(path)
         return _read(Path(path))
 

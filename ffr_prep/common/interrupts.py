@@ -25,7 +25,10 @@ class Interrupted(KeyboardInterrupt):
 
 @contextmanager
 def ending_in_order() -> Iterator[None]:
-    """Every signal that asks the process to end raises `Interrupted` within the block."""
+    """Every signal that asks the process to end raises `Interrupted` within the block.
+
+    Libraries that it strikes as they are loaded make an error of their own of it; what fails after a signal has failed by it.
+    """
 
     def end(number: int, frame: FrameType | None) -> None:
         _asked.append(number)
@@ -34,8 +37,19 @@ def ending_in_order() -> Iterator[None]:
     try:
         with _handled(end):
             yield
+    except Exception as error:
+        if not _asked:
+            raise
+        raise _struck(error) or Interrupted(signal.Signals(_asked[0]).name) from None
     finally:
         _asked.clear()
+
+
+def _struck(error: BaseException | None) -> Interrupted | None:
+    """The interruption on the way to an error, if there is one."""
+    while error is not None and not isinstance(error, Interrupted):
+        error = error.__cause__ or error.__context__
+    return error
 
 
 @contextmanager
