@@ -51,7 +51,6 @@ def reserve(option: str, path: Path | None, suffixes: Sequence[str] = (), usual:
     """
     if path is None:
         return
-    check_ending(option, path, usual)
     if suffixes and path.suffix.lower() not in suffixes:
         raise InputError(
             f"{option} {path}: it is written as {' or '.join(suffixes)}, not {path.suffix or 'without a suffix'}"
@@ -63,6 +62,7 @@ def reserve(option: str, path: Path | None, suffixes: Sequence[str] = (), usual:
         click.get_current_context().with_resource(reserved(path))
     except InputError as error:
         raise InputError(f"{option} {error}") from None
+    check_ending(option, path, usual)
 
 
 def check_ending(option: str, path: Path, usual: str) -> None:
