@@ -22,11 +22,10 @@ from ffr_dyn.studies.runs import Row
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.brief import Brief, Rows
 from ffr_prep.common.errors import InputError
-from ffr_prep.common.hdf5 import check_heaps
+from ffr_prep.common.hdf5 import check_heaps, new_file
 from ffr_prep.common.outputs import replacing
 from ffr_prep.common.reading import reading
 
-_HOW: dict[str, Any] = {"libver": ("v108", "v108"), "locking": False}
 RUN = "run"
 MESSAGE = "message"
 SECTION = "ffr_study"
@@ -176,7 +175,7 @@ def _row(entry: Mapping[str, Any], runs: int, outputs: Set[str]) -> Row:
 
 def save_table(made: Table, path: str | Path) -> None:
     """Write a table (netCDF-4), whole or not at all."""
-    with replacing(path) as part, h5py.File(part, "w", **_HOW) as file:
+    with replacing(path) as part, new_file(part) as file:
         file.attrs[SECTION] = 1
         _variable(file, RUN, np.arange(len(made), dtype=np.int64)).make_scale(RUN)
         for name, values in {**made.parameters, **made.outputs, MESSAGE: list(made.messages)}.items():

@@ -83,7 +83,8 @@ def run_command(group: click.Group, program: str, arguments: Sequence[str] | Non
     try:
         with ending_in_order(), command_inputs():
             group.main(arguments, prog_name=program, standalone_mode=False)
-            sys.stdout.flush()
+            if sys.stdout is not None:  # closed by who started us
+                sys.stdout.flush()
     except BrokenPipeError:  # who read our output has enough, such as `head`
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(1)
@@ -108,7 +109,9 @@ def _last_words(program: str, error: Exception) -> tuple[str, int]:
     if isinstance(error, click.ClickException):
         return error.format_message(), error.exit_code
     if isinstance(error, OSError):
-        where = error.filename2 or error.filename or "file"
+        where = error.filename2 or error.filename
+        if where is None:
+            return f"what is printed cannot be written ({error.strerror or error}); files that are told are whole", 1
         return f"{os.fsdecode(where)}: {error.strerror or error}; choose another place", 2
     if TOO_MANY_DIGITS in str(error):
         return "a number has too many digits; give a smaller one", 2
