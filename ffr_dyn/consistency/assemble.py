@@ -26,6 +26,7 @@ from ffr_dyn.equations.layout import Layout, initial_state
 from ffr_dyn.scene.scene import Scene, altered, require_scene
 from ffr_dyn.variants.mean_axis import in_mean_axis_frames
 from ffr_dyn.variants.plane import obstacles, planar_forms
+from ffr_prep.body import mesh_doubt
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.brief import Brief
 from ffr_prep.common.errors import InputError
@@ -89,6 +90,8 @@ def assemble(scene: Scene, *, time: float = 0.0) -> Assembled:
             "across it"
         )
     notes += sliding_notes(scene)
+    doubts = ((body.name, mesh_doubt(body.model.provenance)) for body in scene.bodies)
+    notes += [f"body {name!r}: {doubt}" for name, doubt in doubts if doubt]
     notes += held_frequencies(
         declared, [(x[place.R(b)], x[place.p(b)]) for b in range(len(place.n))], scene.plane, time
     )

@@ -15,6 +15,7 @@ from ffr_prep.body.damping import Damping, damped, with_damping
 from ffr_prep.body.file import content_hash, load_body, save_arrays, save_body, surface_arrays, surface_of
 from ffr_prep.body.frame_change import interface_motions, mass_of_motions
 from ffr_prep.body.mean_axis import FrameMarker, MeanAxisForm, idle_loads, mean_axis_form
+from ffr_prep.body.mesh_error import MESH_ERROR, mesh_doubt, mesh_errors_of
 from ffr_prep.body.movable import immovable
 from ffr_prep.body.reduced import (
     SECTION_FORCES,
@@ -43,6 +44,7 @@ from ffr_prep.body.second_order import (
 )
 
 __all__ = [
+    "MESH_ERROR",
     "SECTION_FORCES",
     "TENSOR",
     "BeamForces",
@@ -69,6 +71,8 @@ __all__ = [
     "load_body",
     "mass_of_motions",
     "mean_axis_form",
+    "mesh_doubt",
+    "mesh_errors_of",
     "pair_values",
     "reach_of",
     "recombined",

@@ -32,6 +32,8 @@ class Model(Brief):
     record     : what the model is; JSON values
     packages   : whose versions are recorded
     doubts     : what the integrals of a basis (Z, n) cannot be trusted with, in words
+    mesh_energy: (n,) twice the strain energy that the size of the elements adds to a basis (Z, n); None where the elements
+                 are not known
     damping    : (n, n) damping matrix of a basis (Z, n); None where the model has none
     massless   : some coordinates have no mass
     unstressed : stresses are not known, and with them neither `stiffening` nor `second`: the body is linear
@@ -51,6 +53,7 @@ class Model(Brief):
     record: Mapping[str, Any]
     packages: tuple[str, ...] = ("ffr", "numpy", "scipy", "scikit-fem")
     doubts: Callable[[Array], list[str]] = lambda _: []
+    mesh_energy: Callable[[Array], Array | None] = lambda _: None
     damping: Callable[[Array], Array | None] = lambda _: None
     massless: bool = False
     unstressed: bool = False

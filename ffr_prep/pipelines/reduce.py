@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from ffr_prep.body import Damping, FlexibleBody, Interface, with_damping
+from ffr_prep.body import Damping, FlexibleBody, Interface, mesh_doubt, with_damping
 from ffr_prep.body.provenance import described
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError, InputError
@@ -22,6 +22,7 @@ from ffr_prep.model.reactions import in_equilibrium, known_loads
 from ffr_prep.model.reference import ReferenceConditions, conditions_of_part, functionals
 from ffr_prep.reduction.basis import Basis, Reduction, check_basis, factorised
 from ffr_prep.reduction.held_body import held_body, needs_held_body
+from ffr_prep.reduction.mesh_error import mesh_error
 from ffr_prep.reduction.quality import assess, completed
 from ffr_prep.reduction.second_order import check_size, with_second_order
 from ffr_prep.reduction.selection import Band
@@ -144,6 +145,8 @@ def _reduced(model: Model, request: Request, progress: Stages, advance: Advance)
     progress("reduce")
     basis = (_shifted_basis if model.massless else _basis)(request.reduction, coupled, body, L)
     check_basis(coupled, L, basis)
+    progress("estimate the error of the mesh")
+    of_mesh = mesh_error(model, basis)
     if request.quality:
         progress("compare with the full model")
     assessed = assess(coupled, body, L, basis, request.quality) if request.quality else None
@@ -164,13 +167,14 @@ def _reduced(model: Model, request: Request, progress: Stages, advance: Advance)
             progress("compute the second order of the surface")
             drawn = replace(basis, Z=basis.Z[:, : request.drawn_modes], omega2=basis.omega2[: request.drawn_modes])
             surface = with_second_order(surface, model, held, request.reference, drawn, advance)
+    doubts = [*model.doubts(basis.Z), *filter(None, [mesh_doubt(of_mesh)])]
     made = FlexibleBody(
         name=request.name,
         omega2=basis.omega2,
         interfaces=interface_shapes(coupled, basis),
         surface=surface,
         stiffening=stiffening,
-        provenance=completed(record(model, request, model.doubts(basis.Z)), basis, assessed),
+        provenance=completed(record(model, request, doubts) | of_mesh, basis, assessed),
         damping=model.damping(basis.Z),
         **vars(integrals),
     )

@@ -84,11 +84,6 @@ def tied(parts: Mapping[str, Model], ties: Sequence[tuple[str, str]]) -> Model:
         known = stiffening(np.zeros((X.shape[1], count)), np.eye(count), basis)
         return tied_second_order(models, X, own, steps, (of_ties, loads), known, basis)
 
-    def doubts(basis: Array) -> list[str]:
-        return [
-            f"{name}: {doubt}" for (name, m), x in zip(parts.items(), own, strict=True) for doubt in m.doubts(x @ basis)
-        ]
-
     return Model(
         coupled=coupled,
         inertia=inertia,
@@ -102,15 +97,21 @@ def tied(parts: Mapping[str, Model], ties: Sequence[tuple[str, str]]) -> Model:
             "ties": [list(pair) for pair in ties],
             "warnings": [f"{name}: {w}" for name, part in parts.items() for w in part.record.get("warnings", [])],
         },
-        doubts=doubts,
-        damping=lambda basis: _damping(models, [x @ basis for x in own]),
+        doubts=lambda basis: _doubts(parts, [x @ basis for x in own]),
+        mesh_energy=lambda basis: _known_sum([m.mesh_energy(x @ basis) for m, x in zip(models, own, strict=True)]),
+        damping=lambda basis: _known_sum([m.damping(x @ basis) for m, x in zip(models, own, strict=True)]),
         unstressed=any(m.unstressed for m in models),
     )
 
 
-def _damping(models: Sequence[Model], bases: Sequence[Array]) -> Array | None:
-    found = [D for m, basis in zip(models, bases, strict=True) if (D := m.damping(basis)) is not None]
-    return np.sum(found, axis=0) if found else None
+def _doubts(parts: Mapping[str, Model], bases: Sequence[Array]) -> list[str]:
+    return [f"{name}: {d}" for (name, m), basis in zip(parts.items(), bases, strict=True) for d in m.doubts(basis)]
+
+
+def _known_sum(parts: Sequence[Array | None]) -> Array | None:
+    """Of those parts that know theirs; None of none."""
+    known = [part for part in parts if part is not None]
+    return np.sum(known, axis=0) if known else None
 
 
 # ---- loads that pass through ties ---------------------------------------------------------------------------------

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ffr_prep.body import FlexibleBody
+from ffr_prep.body import MESH_ERROR, FlexibleBody, mesh_errors_of
 from ffr_prep.body.interface_freedom import interface_freedom
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.in_words import settings_in_words, vector_in_words
@@ -50,6 +50,7 @@ def body_lines(body: FlexibleBody) -> Iterator[str]:
     yield from _region_lines(body.provenance)
     yield from _choice_lines(body.provenance)
     yield from mode_lines(body)
+    yield from mesh_error_lines(body.provenance)
     yield from damping_lines(body)
     yield from verification_lines(body.provenance)
     yield from integral_lines(body)
@@ -67,6 +68,7 @@ def short_lines(body: FlexibleBody) -> Iterator[str]:
     if body.n:
         shown = ", ".join(f"{f:.4g}" for f in body.frequencies[:6])
         yield f"modes       {body.n}: {shown}{', ...' if body.n > 6 else ''} Hz"
+    yield from mesh_error_lines(body.provenance)
     yield from damping_lines(body)
     yield from part_lines(body)
     yield from quality_lines(body)
@@ -146,6 +148,13 @@ def mode_lines(body: FlexibleBody) -> Iterator[str]:
     if body.n > _MOST_MODES:
         yield f"{'':9}{body.n - _MOST_MODES} more up to {body.frequencies[-1]:.6g} Hz"
     yield f"{'sum':>7}  {'':15}  " + " ".join(f"{total:7.2f}" for total in shares.sum(axis=0))
+
+
+def mesh_error_lines(provenance: Mapping[str, Any]) -> Iterator[str]:
+    """How much too high the frequencies are by the size of the elements, as far as that is known."""
+    if errors := mesh_errors_of(provenance):
+        each = ", ".join(f"{_percent(error)} ({mode})" for mode, error in errors.items())
+        yield f"mesh error  frequencies too high by about {each}; in brackets the mode"
 
 
 def damping_lines(body: FlexibleBody) -> Iterator[str]:
@@ -285,6 +294,7 @@ def _origin_lines(provenance: Mapping[str, Any]) -> Iterator[str]:
             "quality",
             "normal_modes",
             "held_body",
+            MESH_ERROR,
             "regions",
             "command",
         ):

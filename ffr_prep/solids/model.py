@@ -24,6 +24,7 @@ from ffr_prep.reduction.mesh_resolution import element_edges
 from ffr_prep.solids.assembly import Materials, assemble
 from ffr_prep.solids.cutting import cut_mesh
 from ffr_prep.solids.interfaces import couple, turning_regions
+from ffr_prep.solids.mesh_error import added_energy
 from ffr_prep.solids.second_order import second_order
 from ffr_prep.solids.stiffening import inertial_loads, stiffening_of
 from ffr_prep.solids.stress_modes import AVERAGING, boundary, stressed_boundary
@@ -83,6 +84,7 @@ def from_mesh(
             "interfaces": [_described(plain, interface) for interface in interfaces],
             "warnings": mesh_warnings(mesh),
         },
+        mesh_energy=lambda basis: added_energy(mesh, material, [i.region or i.name for i in interfaces], field(basis)),
         cut=lambda cuts: [from_mesh(*part) for part in cut_mesh(mesh, material, interfaces, cuts)],
     )
 

@@ -67,7 +67,7 @@ def stressed_boundary(mesh: Mesh, material: Materials, Phi: Array, pairs: tuple[
     """
     outside = surface_triangles(mesh)
     near = _near_surface(mesh, outside[0])
-    moduli, of_element = _materials(near, material)
+    moduli, of_element = elastic_materials(near, material)
     parts = [_material_boundary(near, outside, of_element == k) for k in range(len(moduli))]
     points = np.concatenate([nodes for nodes, _ in parts])
     owner = np.repeat(np.arange(len(parts)), [len(nodes) for nodes, _ in parts])
@@ -149,10 +149,10 @@ def _near_surface(mesh: Mesh, nodes: Array) -> Mesh:
     """The elements that have one of the nodes; the nodes keep their numbers."""
     outside = np.zeros(len(mesh.points), bool)
     outside[nodes] = True
-    return _picked(mesh, np.concatenate([outside[block.nodes].any(axis=1) for block in mesh.blocks]))
+    return picked(mesh, np.concatenate([outside[block.nodes].any(axis=1) for block in mesh.blocks]))
 
 
-def _picked(mesh: Mesh, keep: Array) -> Mesh:
+def picked(mesh: Mesh, keep: Array) -> Mesh:
     """Some elements of the mesh with their volume groups."""
     new = np.cumsum(keep) - 1
     of_blocks = np.split(keep, np.cumsum([len(block.nodes) for block in mesh.blocks])[:-1])
@@ -161,7 +161,7 @@ def _picked(mesh: Mesh, keep: Array) -> Mesh:
     return replace(mesh, blocks=tuple(blocks), volume_groups=groups, face_groups={}, node_groups={})
 
 
-def _materials(mesh: Mesh, material: Materials) -> tuple[Array, Array]:
+def elastic_materials(mesh: Mesh, material: Materials) -> tuple[Array, Array]:
     """(m, 2) engineering constants of the materials that differ elastically, and their number for each element.
 
     The constants are Young's modulus [Pa] and Poisson's ratio, zeros where the material is anisotropic.
@@ -177,7 +177,7 @@ def _material_boundary(near: Mesh, outside: tuple[Array, Array], own: Array) -> 
     """(P,) nodes and (T, 3) triangles, those of the boundary `outside` that belong to some of the elements."""
     if own.all():
         return outside
-    pairs = [(block.kind, block.nodes) for block in _picked(near, own).blocks if len(block.nodes)]
+    pairs = [(block.kind, block.nodes) for block in picked(near, own).blocks if len(block.nodes)]
     theirs = np.concatenate([faces[:, FACE_TRIANGLES[faces.shape[1]]].reshape(-1, 3) for faces in outer_faces(pairs)])
     nodes, triangles = outside
     shared = _in(np.sort(theirs, axis=1), np.sort(nodes[triangles], axis=1))

@@ -1,0 +1,26 @@
+"""How much too high the frequencies of a body are by the size of its elements, as a reduction keeps it with the body."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+MESH_ERROR = "mesh_error"  # of the provenance
+TOLD = 0.02  # of the lowest frequency, from where on it is told unasked
+
+
+def mesh_errors_of(provenance: Mapping[str, Any]) -> dict[int, float]:
+    """For each mode that was looked at, by its number from 1, how much too high its frequency is: 0.02 of 2 per cent."""
+    kept = provenance.get(MESH_ERROR, {"modes": [], "too_high": []})
+    return dict(zip(kept["modes"], kept["too_high"], strict=True))
+
+
+def mesh_doubt(provenance: Mapping[str, Any]) -> str | None:
+    """What is said of a body whose lowest frequency the mesh makes too high."""
+    first = mesh_errors_of(provenance).get(1, 0.0)
+    if first < TOLD:
+        return None
+    return (
+        f"its mesh is too coarse: the lowest frequency is about {100 * first:.2g} % too high; reduce it with smaller "
+        "elements or with those of second order (`ffr-prep reduce --size`, `--order 2`)"
+    )
