@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from unittest.mock import patch
 
 import numpy as np
 from prep_remedy import box, edited, rewritten, with_files, words
@@ -135,7 +136,19 @@ MATERIALS = [
 # ---- geometries ---------------------------------------------------------------------------------------------------------
 
 MESHED = "mesh part.geo --size 1 --order 1"
+
+
+def crowded() -> object:
+    """A mesh where no folder has room for temporary files."""
+    with patch("tempfile.TemporaryDirectory", side_effect=OSError(28, "No space left on device")):
+        read_mesh("part.geo", size=1.0)
+
+
 GEOMETRIES = [
+    Case(
+        lambda: with_files(lambda: crowded(), {}),
+        lambda: with_files(lambda: read_mesh("part.geo", size=1.0, order=1), {}),
+    ),
     shown(f"{MESHED} --glue", MESHED),
     shown("mesh table.csv"),
     words("mesh other.step", MESHED, other_step="no STEP\n"),
