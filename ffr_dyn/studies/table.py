@@ -88,6 +88,9 @@ def _column(values: list[Any]) -> Any:
     return values if any(isinstance(one, str) for one in values) else np.array(values, dtype=float)
 
 
+_DAMAGE = (ValueError, TypeError, KeyError, AttributeError, OverflowError, RecursionError)  # of a line of the journal
+
+
 # ---- the journal ----------------------------------------------------------------------------------------------------
 
 
@@ -120,14 +123,7 @@ class Journal:
             try:
                 entry = json.loads(line)
                 row = _row(entry, begun["runs"], self._outputs) if k else None
-            except (
-                ValueError,
-                TypeError,
-                KeyError,
-                AttributeError,
-                OverflowError,
-                RecursionError,
-            ):  # damaged: done again from here
+            except _DAMAGE:  # done again from here
                 break
             if k == 0 and entry != begun:
                 raise InputError(

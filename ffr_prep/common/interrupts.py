@@ -25,10 +25,7 @@ class Interrupted(KeyboardInterrupt):
 
 @contextmanager
 def ending_in_order() -> Iterator[None]:
-    """Every signal that asks the process to end raises `Interrupted` within the block.
-
-    Libraries that it strikes as they are loaded make an error of their own of it; what fails after a signal has failed by it.
-    """
+    """Every signal that asks the process to end raises `Interrupted` within the block; what fails after it fails by it."""
 
     def end(number: int, frame: FrameType | None) -> None:
         _asked.append(number)
@@ -38,18 +35,18 @@ def ending_in_order() -> Iterator[None]:
         with _handled(end):
             yield
     except Exception as error:
-        if not _asked:
-            raise
-        raise _struck(error) or Interrupted(signal.Signals(_asked[0]).name) from None
+        if _asked:
+            raise _struck(error) from None
+        raise
     finally:
         _asked.clear()
 
 
-def _struck(error: BaseException | None) -> Interrupted | None:
-    """The interruption on the way to an error, if there is one."""
+def _struck(error: BaseException | None) -> Interrupted:
+    """The interruption on the way to an error; where it is not known, one more."""
     while error is not None and not isinstance(error, Interrupted):
         error = error.__cause__ or error.__context__
-    return error
+    return error or Interrupted(signal.Signals(_asked[0]).name)
 
 
 @contextmanager

@@ -105,13 +105,12 @@ def read_toml(path: str | Path, what: str) -> dict[str, Any]:
             raise InputError(f"{path} has {len(text) / 1e6:.0f} MB; {what} has at most {_MOST_TOML / 1e6:.0f}")
         try:
             tree = tomllib.loads(text.decode("utf-16" if text.startswith(_MARKS) else "utf-8-sig"))
-        except (tomllib.TOMLDecodeError, ValueError) as error:
+        except ValueError as error:
             if TOO_MANY_DIGITS in str(error):
                 raise _too_large(path, what) from None
-            coded = isinstance(error, UnicodeDecodeError)
-            fault = (
-                "is not text in UTF-8; save it so" if coded else f"is not a readable TOML file: {str(error)[:_SHOWN]}"
-            )
+            fault = f"is not a readable TOML file: {str(error)[:_SHOWN]}"
+            if isinstance(error, UnicodeDecodeError):
+                fault = "is not text in UTF-8; save it so"
             ours = what if Path(path).suffix.lower() != ".toml" else "a text"
             raise InputError(not_of_its_ending(path, ours, fault)) from None
         _check_tree(path, tree)

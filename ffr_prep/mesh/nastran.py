@@ -50,6 +50,7 @@ def from_nastran(path: Path) -> FileMesh:
     try:
         for card in cards(path):
             _take(deck, card)
+            deck.found["GE" if card.name == "MAT1" and card.text(8) else card.name] += 1
         return _file_mesh(deck)
     except InputError as error:
         text = str(error)
@@ -57,7 +58,6 @@ def from_nastran(path: Path) -> FileMesh:
 
 
 def _take(deck: _Deck, card: Card) -> None:
-    deck.found[card.name] += 1
     if card.name == "GRID":
         if deck.grids.setdefault(card.integer(1), card) is not card:
             raise InputError(f"{card} is defined twice")
@@ -73,8 +73,6 @@ def _take(deck: _Deck, card: Card) -> None:
         deck.system = card.integer(2, 0)
     elif card.name == "SET1":
         deck.sets[card.integer(1)] = _members(card)
-    elif card.name == "MAT1" and card.text(8):
-        deck.found["GE"] += 1
 
 
 def _take_solid(deck: _Deck, card: Card) -> None:
