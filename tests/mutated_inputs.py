@@ -182,7 +182,7 @@ reduction = {method = "craig-bampton", modes = 2}
 [members.column]
 section = {shape = "rectangle", b = 0.02, h = 0.05}
 material = "steel"
-orientation = [0, 1, 0]
+orientation = [0, 0, 1]
 [[polylines]]
 member = "column"
 corners = [[0, 0, 0], [1, 0, 0], [1, 1, 0]]
@@ -206,6 +206,56 @@ G23 = 4e9
 rho = 1600
 """
 SUPPORTS = '[[support]]\ninterface = "a"\nmotion = "translation"\ndirection = [1.0, 0.0, 0.0]\n' * 6
+SWING = """
+[parameters]
+stiffness = 100.0
+damping = 5.0
+[analysis]
+end = 0.1
+output_step = 0.05
+step = 0.005
+[ground]
+O = [0, 0, 0]
+[bodies.rod]
+mass = 1.0
+inertia = [0.01, 0.3333, 0.3333]
+points.a = [0, 0, 0]
+[joints.hinge]
+kind = "revolute"
+i = "ground.O"
+j = "rod.a"
+[forces.s]
+kind = "joint-spring"
+joint = "hinge"
+stiffness = "stiffness"
+damping = "damping"
+"""
+STUDY = """
+scene = "swing.toml"
+samples = 2
+[parameters]
+stiffness = {from = 100, to = 200, count = 2}
+damping = {normal = [5.0, 0.1]}
+[outputs]
+turn = "hinge.angle: largest"
+share = "= turn / stiffness"
+"""
+STEP = """ISO-10303-21;
+DATA;
+#1=(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT(.MILLI.,.METRE.));
+#3=(GEOMETRIC_REPRESENTATION_CONTEXT(3)GLOBAL_UNIT_ASSIGNED_CONTEXT((#1))REPRESENTATION_CONTEXT('',''));
+#4=PLANE('',#5);
+#7=ADVANCED_FACE('top of it',(#8),#4,.T.);
+#9=CLOSED_SHELL('',(#7));
+ENDSEC;
+END-ISO-10303-21;
+"""
+SPRINGS = {
+    "part.sti": "1 1 2.\n1 4 -2.\n4 4 2.\n",
+    "part.mas": "".join(f"{k} {k} 1.5\n" for k in range(1, 7)),
+    "part.dof": "1.1\n1.2\n1.3\n2.1\n2.2\n2.3\n",
+    "part.inp": "*NODE, NSET=ALL\n1, 0., 0., 0.\n2, 1., 0., 0.\n",
+}
 TABLE = "# time, value\n0, 0\n0.5, 1e-3\n1, 2\n"
 
 
@@ -232,9 +282,14 @@ def make_samples(folder: Path) -> None:
         "material.toml": MATERIAL,
         "supports.toml": SUPPORTS,
         "table.csv": TABLE,
+        "swing.toml": SWING,
+        "study.toml": STUDY,
+        "part.step": STEP,
+        **SPRINGS,
     }
     for name, text in texts.items():
         (folder / name).write_text(text)
+    _write_rich(folder)
     body = cloud(3, points=4, stiffness=50.0)
     save_body(body, folder / "body.ffr")
     write_sid(body, folder / "body.sid")
@@ -262,6 +317,33 @@ def make_samples(folder: Path) -> None:
     ]
     (folder / "deck.inp").write_text("\n".join([*deck, "*NSET, NSET=END, GENERATE", "1, 3, 2", ""]))
     _write_meshes(folder, box_mesh("tet10", np.array([1.0, 0.2, 0.1]), (1, 1, 1)), meshio)
+
+
+def _write_rich(folder: Path) -> None:
+    """A body with all that a body file may hold, the table of a study and the journal of one that goes on."""
+    from matrix_models import rod
+
+    import ffr_prep as fp
+    from ffr_dyn.studies.plan import load_study
+    from ffr_dyn.studies.runs import Row
+    from ffr_dyn.studies.table import Journal, save_table, table
+
+    ends = [fp.InterfaceRegion("root"), fp.InterfaceRegion("tip")]
+    model = fp.from_frame(rod(fp.rectangle(0.02, 0.05), 1.0, 4), ends)
+    request = fp.Request(
+        name="rich",
+        reference=fp.MeanAxis(),
+        reduction=fp.CraigBampton(2),
+        stress=True,
+        parts=2,
+        damping=fp.Damping(1.0),
+    )
+    fp.save_body(fp.reduce(model, request), folder / "rich.ffr")
+    study = load_study(folder / "study.toml")
+    rows = [Row(k, {"turn": 1.0, "share": 0.5}, "") for k in range(len(study.points))]
+    save_table(table(study, {row.number: row for row in rows}), folder / "study.nc")
+    with Journal(folder / "study.nc", study) as journal:
+        journal.add(rows)
 
 
 def _write_abaqus_matrix(path: Path, A) -> None:
@@ -313,10 +395,13 @@ def formats() -> dict[str, tuple[tuple[str, ...], Callable[[Path], object]]]:
     from ffr_dyn.results.file import load_checkpoint, load_result
     from ffr_dyn.scene_file.read import load_scene
     from ffr_dyn.scene_file.values import _read_table
+    from ffr_dyn.studies.plan import load_study
+    from ffr_dyn.studies.table import Journal, load_table
     from ffr_prep.body import load_body
     from ffr_prep.cli.options import _supports
     from ffr_prep.interchange.formats import import_body
     from ffr_prep.matrices.readers import read_matrices
+    from ffr_prep.mesh.geometry.step_text import face_labels, length_unit
     from ffr_prep.mesh.mesh import check_mesh, read_mesh
     from ffr_prep.model.material import parse_material
     from ffr_prep.pipelines.file_materials import file_materials, names_of_materials
@@ -326,6 +411,14 @@ def formats() -> dict[str, tuple[tuple[str, ...], Callable[[Path], object]]]:
     def beside(path: Path, *names: str) -> list[Path]:
         return [path.parent / name for name in names]
 
+    def journalled(path: Path) -> None:
+        with Journal(path.with_suffix(""), load_study(path.with_name("study.toml"))):
+            pass
+
+    def told_of_step(text: str) -> None:
+        length_unit(text)
+        face_labels(text, ["plane"])
+
     def with_materials(path: Path) -> None:
         mesh = read_mesh(path)
         check_mesh(mesh)
@@ -334,6 +427,10 @@ def formats() -> dict[str, tuple[tuple[str, ...], Callable[[Path], object]]]:
 
     return {
         "body": (("body.ffr",), load_body),
+        "rich body": (("rich.ffr",), load_body),
+        "study": (("study.toml",), load_study),
+        "table of a study": (("study.nc",), load_table),
+        "journal": (("study.nc.journal",), journalled),
         "result": (("run.nc",), lambda path: (load_result(path), load_checkpoint(path))),
         "scene": (("scene.toml",), load_scene),
         "structure": (("structure.toml",), read_structure),
@@ -348,6 +445,11 @@ def formats() -> dict[str, tuple[tuple[str, ...], Callable[[Path], object]]]:
         "rows": (("rows.csv",), lambda path: read_matrices([*beside(path, "K.mtx", "M.mtx"), path])),
         "Abaqus matrix": (("abaqus_K.mtx",), lambda path: read_matrices([path, *beside(path, "abaqus_M.mtx", "deck.inp")])),
         "Abaqus deck": (("deck.inp",), lambda path: read_matrices([*beside(path, "abaqus_K.mtx", "abaqus_M.mtx"), path])),
+        "CalculiX matrices": (
+            ("part.sti", "part.mas", "part.dof", "part.inp"),
+            lambda path: read_matrices(beside(path, *SPRINGS)),
+        ),
+        "STEP text": (("part.step",), lambda path: told_of_step(path.read_text(errors="replace"))),
         "Abaqus mesh": (("mesh.inp",), with_materials),
         "Nastran": (("mesh.bdf", "fields.bdf"), with_materials),
         "CalculiX": (("mesh.frd",), lambda path: check_mesh(read_mesh(path))),
@@ -402,6 +504,8 @@ def read_many(name: str, seed: int, first: int, last: int, folder: Path) -> None
         target.unlink(missing_ok=True)
         target.write_bytes(mutated(samples[which], others[random.integers(len(others))], random))
         print(outcome(read, target), flush=True)
+        target.unlink(missing_ok=True)
+        target.symlink_to(folder / files[which])  # sound again, for those that are read with it
 
 
 # ---- from outside ---------------------------------------------------------------------------------------------------

@@ -59,6 +59,8 @@ SURE = 10.0  # times, by which an evaluation may take longer than is guessed bef
 MOST_ROWS = 1000  # of the first call
 SECONDS_PER_CALL = 0.25  # of the compiled loop, between two looks at progress, file and keyboard
 
+_MOST_STEPS = 1e15  # of a run: decades of a processor
+
 
 @dataclass
 class _Run:
@@ -171,6 +173,11 @@ def _counts(span: float, output_step: float, step: float) -> tuple[int, int]:
         )
     if rows < 1 or abs(rows * output_step - span) > 1e-9 * span:
         raise InputError(f"the duration {span} s is not a multiple of the output step {output_step} s")
+    if substeps * rows > _MOST_STEPS:
+        raise InputError(
+            f"steps of {step:g} s make {float(substeps) * rows:.2g} steps of {span:g} s, which no computer takes; give a "
+            "longer step"
+        )
     return substeps, rows
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ffr_dyn.cli.run import begins_as_given, parameter_option, require_after, scene_argument
-from ffr_prep.common.command import OUTPUT_FILE, reserve
+from ffr_prep.common.command import OUTPUT_FILE, FiniteRange, reserve
 from ffr_prep.common.entries import assignments
 from ffr_prep.common.errors import InputError
 
@@ -56,9 +56,9 @@ Terms that --drop leaves out: I3 I4 I5 I8 I9 (inertia integrals) and stiffening;
 @click.option(
     "--repeats", default=5, show_default=True, type=click.IntRange(1), help="How often a run is timed, at least."
 )
-@click.option("--limit", default=60.0, show_default=True, type=click.FloatRange(0.0, min_open=True),
+@click.option("--limit", default=60.0, show_default=True, type=FiniteRange(0.0, min_open=True),
               help="Wall time [s] that one run may take.")  # fmt: skip
-@click.option("--wanted", default=1e-6, show_default=True, type=click.FloatRange(0.0, 1.0, min_open=True),
+@click.option("--wanted", default=1e-6, show_default=True, type=FiniteRange(0.0, 1.0, min_open=True),
               help="Relative error of the reference at which its refinement ends: a tenth of what you look for.")  # fmt: skip
 @click.option("--workers", type=click.IntRange(0), help="Local processes; default half the processors, 0: none, here.")
 @click.option("--cluster", metavar="ADDRESS", help="Scheduler of a Dask cluster that runs the variants instead.")

@@ -66,7 +66,7 @@ def economise(
     settings = over_time(given, analysis, ())
     target = target or scene.with_suffix(".economised.toml")
     require_after("--end", end, settings.start)
-    reserve("-o", target)
+    reserve("-o", target, usual=".toml")
     report = report or target.with_suffix(".html")
     reserve("--report", report, (".html", ".md", ".txt"))
     reserve("--chart", chart, (".png", ".svg"))

@@ -53,14 +53,17 @@ def parts(scene: Path, parameters: tuple[str, ...], angle: str, at_rest: bool, r
     files are looked for from the folder that one is in.
     """
     from ffr_dyn.analyses.static import Static
-    from ffr_dyn.consistency.validity import in_enough_parts, parts_needed
+    from ffr_dyn.consistency.validity import check_angle, in_enough_parts, parts_needed
     from ffr_dyn.scene.parts import owner
     from ffr_dyn.scene_file.parameters import as_number
     from ffr_dyn.scene_file.read import body_files, load_scene
 
     given, allowed = assignments(parameters), as_number(angle, {}, "--angle", "rad")
+    check_angle(allowed)
     files = body_files(scene, given)
     found, settings = load_scene(scene, given)
+    if not any(body.model.n for body in found.bodies):
+        raise InputError(f"{scene}: no body is flexible, so none needs parts; give bodies with a file that has modes")
     chosen = at_moment(settings, Static(), None, STATES) if at_rest else replace(settings, outputs=STATES)
 
     def make(counts: Mapping[str, int]) -> Scene:

@@ -230,7 +230,7 @@ def analysed(
 
     if resume:
         require_resumable(settings)
-    reserve("-o", output)
+    reserve("-o", output, usual=".nc")
     if not isinstance(settings, Settings):
         return analyse(scene, settings, path=output)
     with progress(scene.name, settings.end, start=settings.start) as update:

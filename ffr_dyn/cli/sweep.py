@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from ffr_prep.common.command import INPUT_FILE, OUTPUT_FILE
+from ffr_prep.common.command import INPUT_FILE, OUTPUT_FILE, check_ending
 
 NOTES = """\b
 A study file:
@@ -55,6 +55,7 @@ def sweep(
     from ffr_dyn.studies.sweep import sweep as run_all
 
     made, output = load_study(study), output or study.with_suffix(".nc")
+    check_ending("-o", output, ".nc")
     with counted("bodies") as bodies, counted("runs") as runs:
         table = run_all(made, output, cache=cache, workers=workers, cluster=cluster, progress=runs, making=bodies)
     click.echo(repr(table))

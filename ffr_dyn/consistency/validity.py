@@ -124,8 +124,7 @@ def parts_needed(scene: Scene, result: Result, angle: float = BENT) -> dict[str,
 
     >>> fd.parts_needed(scene, result)  # {"rod": 3}
     """
-    if not angle > 0:
-        raise InputError(f"the angle is {angle} rad; it must be positive")
+    check_angle(angle)
     needed: dict[str, int] = {}
     for body in scene.bodies:
         if body.model.n:
@@ -133,6 +132,12 @@ def parts_needed(scene: Scene, result: Result, angle: float = BENT) -> dict[str,
             parts = _enough(_count(body), turn / angle, share / STRETCHED)
             needed[owner(body)] = max(parts, needed.get(owner(body), 1))
     return needed
+
+
+def check_angle(angle: float) -> None:
+    """Raises InputError for an angle [rad] that no part can keep within."""
+    if not angle > 0:
+        raise InputError(f"the angle is {angle} rad; it must be positive")
 
 
 def in_enough_parts(

@@ -13,8 +13,10 @@ from ffr_dyn.scene.drivers import Driver
 from ffr_dyn.scene.joints import COORDINATES
 from ffr_dyn.scene.scene import Scene
 from ffr_prep.common.errors import InputError
+from ffr_prep.common.reading import check_count
 from ffr_prep.common.units import split_quantity, to_si
 
+_MOST = 10_000  # speeds: each is a steady motion of its own
 EVEN = 21  # speeds of a range that does not say how many
 
 
@@ -41,7 +43,9 @@ def _speeds(text: Any) -> list[float]:
             return [_speed(first)]
         unit = split_quantity(last.strip())
         low = _speed(first) if split_quantity(first.strip()) or unit is None else to_si(float(first), unit[1], "rad/s")
-        return np.linspace(low, _speed(last), int(count) if colon else EVEN).tolist()
+        many = int(count) if colon else EVEN
+        check_count(many, "speeds", _MOST)
+        return np.linspace(low, _speed(last), many).tolist()
     except (ValueError, InputError) as error:
         why = f" ({error})" if isinstance(error, InputError) else ""
         raise InputError(

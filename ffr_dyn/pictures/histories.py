@@ -20,7 +20,7 @@ from matplotlib.figure import Figure
 from ffr_dyn.results.result import Quantity, Result
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
-from ffr_prep.common.outputs import replacing
+from ffr_prep.common.outputs import check_output, replacing
 from ffr_prep.common.units import bracketed, readable
 
 # Okabe & Ito 2008, "Color universal design", without the yellow, which is too pale for a line on white.
@@ -197,10 +197,17 @@ def _written(figure: Drawing, path: str | Path | None) -> Drawing:
     return figure
 
 
-def _write(figure: Figure, path: str | Path) -> None:
-    path = Path(path)
-    kind = path.suffix.lower()
+def check_picture(path: str | Path) -> None:
+    """Before the work, not after it: InputError for a place or a format in which no picture can be written."""
+    kind = Path(path).suffix.lower()
     if kind not in _METADATA:
         raise InputError(f"{path}: pictures are written as {', '.join(_METADATA)}, not {kind or 'without a suffix'}")
+    check_output(Path(path))
+
+
+def _write(figure: Figure, path: str | Path) -> None:
+    path = Path(path)
+    check_picture(path)
+    kind = path.suffix.lower()
     with replacing(path) as part:
         figure.savefig(part, format=kind[1:], dpi=130, metadata=_METADATA[kind])

@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Any
 from xml.sax.saxutils import quoteattr
 
-import h5py
 import numpy as np
 
 from ffr_dyn.pictures.film import Film, Solid, displaced, film_at
@@ -21,11 +20,11 @@ from ffr_dyn.results.stress import values_at
 from ffr_dyn.scene.stress_sensors import MEASURES
 from ffr_prep.body import displacements
 from ffr_prep.common.arrays import Array
+from ffr_prep.common.hdf5 import new_file
 from ffr_prep.common.outputs import replacing
 
 _TRIANGLE, _LINE = 5, 3  # kinds of cells
 _BATCH = 400_000  # points times rows that are worked on at once
-_HOW: dict[str, Any] = {"libver": ("v108", "v108"), "locking": False}
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,7 +99,7 @@ def write_vtkhdf(result: Result, path: Path) -> Path:
     """One file with the mesh and, for each row of the result, the fields."""
     film = film_at(result, result.time, colour="body")
     mesh, rows = grid(film), result.time.size
-    with replacing(path) as part, h5py.File(part, "w", **_HOW) as file:
+    with replacing(path) as part, new_file(part) as file:
         root = file.create_group("VTKHDF")
         root.attrs["Version"] = np.array([2, 0], np.int64)
         root.attrs["Type"] = np.bytes_("UnstructuredGrid")

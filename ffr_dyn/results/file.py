@@ -25,7 +25,7 @@ import os
 import shutil
 import time
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import ExitStack, contextmanager
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from types import TracebackType
@@ -38,7 +38,7 @@ from ffr_dyn.results.result import XYZ, Axis, Quantity, Result, check_times
 from ffr_prep.body import QuadraticField, Surface, surface_arrays, surface_of
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError, InputError
-from ffr_prep.common.hdf5 import check_heaps
+from ffr_prep.common.hdf5 import HOW, abandon, check_heaps, why
 from ffr_prep.common.interrupts import undisturbed
 from ffr_prep.common.outputs import check_output, replacing, writing
 from ffr_prep.common.reading import nearest_file, not_of_its_ending
@@ -51,7 +51,6 @@ _SECOND = ("second", "second_stress", "beams/second")
 _CHUNK_BYTES, _CHUNK_ROWS = 32768, 512
 _BUFFER_BYTES = 4 << 20
 _SPARE_BYTES, _SPARE_OF_QUANTITY = 1 << 16, 4096  # for what HDF5 keeps beside the values
-_HOW: dict[str, Any] = {"libver": ("v108", "v108"), "locking": False}  # the working file is locked by `writing`
 _MARKS = ("Conventions", "ffr_format", "ffr_format_version", "json_attributes")
 
 
@@ -79,7 +78,7 @@ def with_attributes(path: str | Path, attributes: Mapping[str, Any]) -> None:
     """Give a finished result file other attributes, in one piece: it is replaced by its copy with them."""
     with replacing(path) as part:
         shutil.copyfile(path, part)
-        with h5py.File(part, "r+", **_HOW) as file:
+        with h5py.File(part, "r+", **HOW) as file:
             _write_attributes(file, attributes)
             file.attrs["status"] = attributes.get("status", "complete")
 
@@ -186,7 +185,7 @@ class ResultWriter:
         except (OSError, ComputationError) as error:
             self._give_up()
             raise InputError(
-                f"{self.path} cannot be written ({error.__cause__ or error}); choose another place, or make room there"
+                f"{self.path} cannot be written ({why(error.__cause__ or error)}); choose another place, or make room there"
             ) from None
         self._published_at = time.monotonic()
         self._publishing_took = 0.0
@@ -195,7 +194,7 @@ class ResultWriter:
     def _begin(self, header: Result) -> None:
         self.path.parent.mkdir(parents=True, exist_ok=True)
         self._part = self._held.enter_context(writing(self.path))
-        self._file = h5py.File(self._part, "w", track_order=True, **_HOW)
+        self._file = h5py.File(self._part, "w", track_order=True, **HOW)
         self._take_space(_bytes_of(header))
         _write_structure(self._file, header)
         self._keep_checkpoint()
@@ -235,7 +234,7 @@ class ResultWriter:
             try:
                 self._publish_copy()
             finally:
-                self._file = h5py.File(self._part, "r+", **_HOW)
+                self._file = h5py.File(self._part, "r+", **HOW)
         self._published_at = time.monotonic()
         self._publishing_took = self._published_at - started
 
@@ -261,7 +260,7 @@ class ResultWriter:
             self._drain()
             self._take_space(2 * len(json.dumps(dict(attributes or {}), default=str)))
             self._file.close()
-            self._file = h5py.File(self._part, "r+", **_HOW)  # which sees the space that was taken, and gives it back
+            self._file = h5py.File(self._part, "r+", **HOW)  # which sees the space that was taken, and gives it back
             if attributes is not None:
                 _write_attributes(self._file, attributes)
             self._file.attrs["status"] = status
@@ -348,15 +347,14 @@ class ResultWriter:
 
     def _stopped(self, error: OSError) -> ComputationError:
         """The file itself is sound."""
-        why = error.strerror or error
         return ComputationError(
-            f"writing {self.path} failed ({why}); rows until then are kept: check the free space of the disk"
+            f"writing {self.path} failed ({why(error)}); rows until then are kept: check the free space of the disk"
         )
 
     def _give_up(self) -> None:
         """Leave the working file, whatever state it is in."""
         if self._file:
-            _abandon(self._file)
+            abandon(self._file)
             self._part.unlink(missing_ok=True)
         self._held.close()
 
@@ -371,7 +369,7 @@ class ResultWriter:
             self._give_up()
             kept = "it holds the rows of before" if self._published else "it is as it was"
             raise ComputationError(
-                f"writing {self.path} failed ({error}); {kept}: check the free space of the disk"
+                f"writing {self.path} failed ({why(error)}); {kept}: check the free space of the disk"
             ) from error
 
 
@@ -383,16 +381,6 @@ def _bytes_of(result: Result) -> int:
     )
     surfaces = sum(array.nbytes for surface in result.geometry.values() for array in surface_arrays(surface).values())
     return values + surfaces + _SPARE_BYTES
-
-
-def _abandon(file: h5py.File) -> None:
-    """Close a file that cannot be written any more: HDF5 would not let go of it, and crash at the end of the process."""
-    if hasattr(os, "memfd_create"):
-        nowhere = os.memfd_create("lost")
-        os.dup2(nowhere, file.id.get_vfd_handle())
-        os.close(nowhere)
-    with suppress(OSError, RuntimeError, ValueError):
-        file.close()
 
 
 # ---- writing ------------------------------------------------------------------------------------------------------

@@ -9,7 +9,7 @@ from typing import Any
 
 from ffr_dyn.scene_file.toml_lines import lines_of
 from ffr_prep.common.errors import InputError
-from ffr_prep.common.reading import read_toml
+from ffr_prep.common.reading import read_text, read_toml
 
 PATHS = ("file", "table_file")  # keys whose value is a path relative to the file in which it stands
 
@@ -57,8 +57,8 @@ def origin_of_name(source: Source, message: str) -> str:
 def _lines(path: Path) -> dict[tuple[str, ...], int]:
     """Where the entries of a file stand; nowhere when it can no longer be read as it was."""
     try:
-        return lines_of(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        return lines_of(read_text(path, "a scene file"))
+    except InputError:
         return {}
 
 

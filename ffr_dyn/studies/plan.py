@@ -233,7 +233,7 @@ def _range(name: str, given: Mapping[str, Any]) -> Axis:
         )
     try:
         return spaced(float(start), float(end), count, logarithmic=spacing == "log")
-    except InputError as error:
+    except (InputError, OverflowError) as error:
         raise InputError(f"parameters.{name}: {error}") from None
 
 

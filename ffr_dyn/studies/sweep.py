@@ -14,7 +14,7 @@ from ffr_dyn.studies.runs import Point, Recipe, Row, Task, body_file, make, perf
 from ffr_dyn.studies.table import Journal, Table, journal_of, save_table, table
 from ffr_dyn.studies.workers import crew
 from ffr_prep.common.errors import ComputationError, InputError
-from ffr_prep.common.outputs import check_output
+from ffr_prep.common.outputs import reserved
 
 MOST_IN_A_TASK = 64  # runs
 TASKS = 16  # of every worker, at least, that their ends are near each other
@@ -51,9 +51,8 @@ def sweep(
     """
     made = study if isinstance(study, Study) else load_study(study)
     path = Path(path)
-    check_output(path)
     folder = Path(f"{path}.bodies") if cache is None else Path(cache)
-    with Journal(path, made) as journal:
+    with reserved(path), Journal(path, made) as journal:
         left = [number for number in range(len(made.points)) if number not in journal.rows]
         if left:
             try:
@@ -69,7 +68,7 @@ def sweep(
             journal_of(path).unlink()
             raise ComputationError(f"no run has succeeded; the first says: {found.messages[0]}")
         save_table(found, path)
-    journal_of(path).unlink()
+        journal_of(path).unlink()
     return found
 
 

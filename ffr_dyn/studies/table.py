@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Set
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Self
@@ -24,12 +24,11 @@ from ffr_dyn.studies.runs import Row
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.brief import Brief, Rows
 from ffr_prep.common.errors import InputError
-from ffr_prep.common.hdf5 import check_heaps
+from ffr_prep.common.hdf5 import check_heaps, new_file
 from ffr_prep.common.outputs import replacing
 from ffr_prep.common.process_memory import check_memory
 from ffr_prep.common.reading import reading
 
-_HOW: dict[str, Any] = {"libver": ("v108", "v108"), "locking": False}
 RUN, ROW = "run", "row"
 MESSAGE = "message"
 SECTION = "ffr_study"
@@ -105,6 +104,9 @@ def _column(values: list[Any]) -> Any:
     return values if any(isinstance(one, str) for one in values) else np.array(values, dtype=float)
 
 
+_DAMAGE = (ValueError, TypeError, KeyError, AttributeError, OverflowError, RecursionError)  # of a line of the journal
+
+
 # ---- the journal ----------------------------------------------------------------------------------------------------
 
 
@@ -121,6 +123,7 @@ class Journal:
 
     def __init__(self, path: str | Path, study: Study) -> None:
         self.rows: dict[int, Row] = {}
+        self._outputs = {one.name for one in study.outputs}
         self._path, begun = journal_of(path), {"study": mark(study), "runs": len(study.points)}
         sound = self._read(begun) if self._path.exists() else 0
         self._file = open(self._path, "r+b" if self._path.exists() else "w+b")  # noqa: SIM115 - held while runs end
@@ -135,15 +138,15 @@ class Journal:
         for k, line in enumerate(lines):
             try:
                 entry = json.loads(line)
-            except ValueError:
+                row = _row(entry, begun["runs"], self._outputs) if k else None
+            except _DAMAGE:  # done again from here
                 break
             if k == 0 and entry != begun:
                 raise InputError(
                     f"{self._path} is of another study, or of this one before it was changed: name another output, or remove "
                     "it to begin anew"
                 )
-            if k:
-                row = Row(int(entry["run"]), entry["values"], entry["message"])
+            if row is not None:
                 self.rows[row.number] = row
             sound += len(line) + 1
         return sound
@@ -171,12 +174,20 @@ class Journal:
         self._file.close()
 
 
+def _row(entry: Mapping[str, Any], runs: int, outputs: Set[str]) -> Row:
+    """A line of the journal. Raises ValueError or KeyError for what no run of the study can have left."""
+    number, values = int(entry["run"]), {str(name): float(value) for name, value in entry["values"].items()}
+    if not (0 <= number < runs and values.keys() <= outputs):
+        raise ValueError(number)
+    return Row(number, values, str(entry["message"]))
+
+
 # ---- the file -------------------------------------------------------------------------------------------------------
 
 
 def save_table(made: Table, path: str | Path) -> None:
     """Write a table (netCDF-4), whole or not at all."""
-    with replacing(path) as part, h5py.File(part, "w", **_HOW) as file:
+    with replacing(path) as part, new_file(part) as file:
         file.attrs[SECTION] = 1
         _variable(file, RUN, np.arange(len(made), dtype=np.int64)).make_scale(RUN)
         if TIME in made.outputs:
@@ -202,7 +213,7 @@ def load_table(path: str | Path) -> Table:
 
     >>> table = fd.load_table("study.nc")
     """
-    with reading(path, "the table of a study", OSError, KeyError):
+    with reading(path, "the table of a study", OSError, KeyError, AttributeError, TypeError, ValueError, RuntimeError):
         check_heaps(path)
         return _read(Path(path))
 

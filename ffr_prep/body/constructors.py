@@ -11,6 +11,8 @@ from ffr_prep.body.reduced import BeamForces, BodyError, FlexibleBody, Interface
 from ffr_prep.body.second_order import pair_values, recoordinated
 from ffr_prep.common.arrays import Array, ArrayLike
 
+_MOST = 1e60  # of masses, moments and lengths in SI units, so that their products are numbers still
+
 
 def rigid_body(
     name: str,
@@ -36,6 +38,10 @@ def rigid_body(
     if tensor.shape != (3, 3):
         raise BodyError(f"body {name!r}: inertia must be (3,) or (3, 3), not {np.shape(inertia)}")
     c = np.asarray(centre_of_mass, float)
+    if not np.abs([mass, *tensor.ravel(), *c.ravel()]).max() < _MOST:
+        raise BodyError(
+            f"body {name!r}: mass {mass:g} kg, inertia and centre of mass must be finite; give them in SI units"
+        )
     about_origin = tensor + mass * (c @ c * np.eye(3) - np.outer(c, c))
     nothing = np.zeros((3, 0))
     return FlexibleBody(

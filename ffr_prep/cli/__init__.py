@@ -201,7 +201,7 @@ def reduce(mesh: Path, materials: tuple[str, ...], regions: tuple[str, ...], **o
     (interfaces, request), settings = request_of(options), _mesh_settings(options)
     named = regions_of(regions)
     given = material_of(materials) if materials or mesh.suffix.lower() not in CARRIERS else None
-    reserve("-o", options["output"])
+    reserve("-o", options["output"], usual=".ffr")
     tell_of_programs([mesh])
     steps = terminal_steps()
     loaded = read_mesh(mesh, **settings, progress=steps)
@@ -248,7 +248,7 @@ def info(body: Path, terms: tuple[str, ...], output: Path | None) -> None:
 
     chosen(terms)
     if output is not None:
-        reserve("-o", output)
+        reserve("-o", output, usual=".npz")
     source, lines = _described(body)
     show(term_lines(source, terms) if terms else lines)
     if output is not None:

@@ -40,7 +40,7 @@ def convert(body: Path, output: Path, reference: str, linear: bool) -> None:
     from ffr_prep.report.text import short_lines
 
     conditions = reference_of(reference)
-    reserve("-o", output)
+    reserve("-o", output, usual=".ffr")
     loaded = load_body(body)
     converted = with_reference(replace(loaded, stiffening=None) if linear else loaded, conditions)
     save_body(converted, output)

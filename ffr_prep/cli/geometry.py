@@ -73,9 +73,8 @@ def faces_command(
     from ffr_prep.mesh.geometry.face_files import faces, found_faces
     from ffr_prep.report.faces import face_lines, face_picture, face_values
 
-    for option, output in (("--picture", picture), ("--page", page)):
-        if output is not None:
-            reserve(option, output)
+    reserve("--picture", picture, (".png",))
+    reserve("--page", page, (".html",))
     tell_of_programs([] if as_json else [part])
     known = faces(part, glue=options["glue"], **_settings(options))
     if as_json:
@@ -113,7 +112,7 @@ def rigid_command(part: Path, interfaces: tuple[str, ...], output: Path, **optio
 
     density = _density(options["density"], options["material"])
     points = [interface_of(text) for text in interfaces]
-    reserve("-o", output)
+    reserve("-o", output, usual=".ffr")
     tell_of_programs([part])
     body = rigid_part(part, density, points, name=options["name"] or output.stem, **_settings(options))
     save_body(body, output)

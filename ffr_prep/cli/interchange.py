@@ -78,7 +78,7 @@ def import_body(file: Path, units: str, held: bool, output: Path) -> None:
     from ffr_prep.interchange.bare_inertia import held as held_fixed
     from ffr_prep.report.text import short_lines
 
-    reserve("-o", output)
+    reserve("-o", output, usual=".ffr")
     body = formats.import_body(file, units=units)
     body = held_fixed(body) if held else body
     save_body(body, output)

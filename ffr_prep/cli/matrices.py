@@ -64,7 +64,7 @@ def reduce_matrices_command(
     from ffr_prep.matrices.readers import read_matrices
 
     interfaces, request = request_of(options)
-    reserve("-o", options["output"])
+    reserve("-o", options["output"], usual=".ffr")
     steps = terminal_steps()
     steps("read the matrices")
     model = _named(read_matrices(files, units=units), groups)

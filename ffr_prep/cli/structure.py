@@ -77,7 +77,7 @@ def reduce_structure_command(structure: Path, output: Path, entries: tuple[str, 
     from ffr_prep.pipelines.structure_file import geometry_files, read_structure
 
     solver, given = solver_of(options), assignments(entries)
-    reserve("-o", output)
+    reserve("-o", output, usual=".ffr")
     tell_of_programs(geometry_files(structure, given))
     steps = terminal_steps()
     loaded = read_structure(structure, steps, entries=given)

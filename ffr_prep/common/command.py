@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import sys
 from collections.abc import Sequence
@@ -13,6 +14,7 @@ import click
 from ffr_prep.common.errors import ComputationError, InputError
 from ffr_prep.common.interrupts import ending_in_order, ignore_further
 from ffr_prep.common.outputs import command_inputs, note_input, reserved
+from ffr_prep.common.reading import ENDINGS, TOO_MANY_DIGITS
 
 
 class InputPath(click.Path):
@@ -27,13 +29,24 @@ class InputPath(click.Path):
         return path
 
 
+class FiniteRange(click.FloatRange):
+    """A number between limits; not-a-number, which no comparison catches, is none."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        number = super().convert(value, param, ctx)
+        if not math.isfinite(number):
+            self.fail(f"{value} is not a finite number.", param, ctx)
+        return number
+
+
 INPUT_FILE = InputPath()
 OUTPUT_FILE = click.Path(path_type=Path)
 
 
-def reserve(option: str, path: Path | None, suffixes: Sequence[str] = ()) -> None:
+def reserve(option: str, path: Path | None, suffixes: Sequence[str] = (), usual: str = "") -> None:
     """Before the work, not after it: InputError for a file that could not be written, or not in a known format.
 
+    usual : ending of what is written where any is allowed but those of other kinds of files, one of which would be lost
     Until the command ends no other one writes to it.
     """
     if path is None:
@@ -49,6 +62,14 @@ def reserve(option: str, path: Path | None, suffixes: Sequence[str] = ()) -> Non
         click.get_current_context().with_resource(reserved(path))
     except InputError as error:
         raise InputError(f"{option} {error}") from None
+    check_ending(option, path, usual)
+
+
+def check_ending(option: str, path: Path, usual: str) -> None:
+    """InputError for an output called like a file of another kind, which would be lost; usual : the ending it has, or ""."""
+    kind = ENDINGS.get(path.suffix.lower())
+    if kind is not None and usual not in ("", path.suffix.lower()):
+        raise InputError(f"{option} {path}: by its ending this is {kind}; what is written here ends in {usual}")
 
 
 def check_folder(option: str, path: Path) -> None:
@@ -62,7 +83,8 @@ def run_command(group: click.Group, program: str, arguments: Sequence[str] | Non
     try:
         with ending_in_order(), command_inputs():
             group.main(arguments, prog_name=program, standalone_mode=False)
-            sys.stdout.flush()
+            if sys.stdout is not None:  # closed by who started us
+                sys.stdout.flush()
     except BrokenPipeError:  # who read our output has enough, such as `head`
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(1)
@@ -87,8 +109,12 @@ def _last_words(program: str, error: Exception) -> tuple[str, int]:
     if isinstance(error, click.ClickException):
         return error.format_message(), error.exit_code
     if isinstance(error, OSError):
-        where = error.filename2 or error.filename or "file"
+        where = error.filename2 or error.filename
+        if where is None:
+            return f"what is printed cannot be written ({error.strerror or error}); files that are told are whole", 1
         return f"{os.fsdecode(where)}: {error.strerror or error}; choose another place", 2
+    if TOO_MANY_DIGITS in str(error):
+        return "a number has too many digits; give a smaller one", 2
     if isinstance(error, MemoryError):
         return "not enough memory: make the model smaller, such as by a coarser mesh", 1
     return f"{unforeseen(error)}; this is a mistake of the program: please report it, with what you gave it", 1

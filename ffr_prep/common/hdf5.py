@@ -1,14 +1,48 @@
-"""HDF5 files before the library reads them: where one kind of damage would never let it return."""
+"""HDF5 files where the library fails: one kind of damage would never let it return, and a full disk would crash it."""
 
 from __future__ import annotations
 
 import mmap
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import Any
 
 from ffr_prep.common.errors import InputError
 
+HOW: dict[str, Any] = {"libver": ("v108", "v108"), "locking": False}  # working files have locks of their own
+
 _HEAP = b"GCOL\x01\0\0\0"  # signature, version, reserved
 _HEADER = 16  # bytes, of a heap and of an object in it
+
+
+@contextmanager
+def new_file(path: Path) -> Iterator[Any]:
+    """An HDF5 file to write: made in memory, on the disk when the block has ended. Raises OSError where it is not."""
+    import h5py
+
+    with h5py.File(path, "w", driver="core", backing_store=False, **HOW) as file:
+        yield file
+        file.flush()
+        content = file.id.get_file_image()
+    path.write_bytes(content)
+
+
+def abandon(file: Any) -> None:
+    """Close a file that cannot be written any more: HDF5 would not let go of it, and crash at the end of the process."""
+    if file and hasattr(os, "memfd_create"):
+        nowhere = os.memfd_create("lost")
+        os.dup2(nowhere, file.id.get_vfd_handle())
+        os.close(nowhere)
+    with suppress(OSError, RuntimeError, ValueError):
+        file.close()
+
+
+def why(error: BaseException) -> str:
+    """What the system says of a failure, without the library's account of its own state."""
+    number = getattr(error, "errno", None)
+    return os.strerror(number) if number else str(error)
 
 
 def check_heaps(path: str | Path) -> None:

@@ -25,7 +25,7 @@ class Interrupted(KeyboardInterrupt):
 
 @contextmanager
 def ending_in_order() -> Iterator[None]:
-    """Every signal that asks the process to end raises `Interrupted` within the block."""
+    """Every signal that asks the process to end raises `Interrupted` within the block; what fails after it fails by it."""
 
     def end(number: int, frame: FrameType | None) -> None:
         _asked.append(number)
@@ -34,8 +34,19 @@ def ending_in_order() -> Iterator[None]:
     try:
         with _handled(end):
             yield
+    except Exception as error:
+        if _asked:
+            raise _struck(error) from None
+        raise
     finally:
         _asked.clear()
+
+
+def _struck(error: BaseException | None) -> Interrupted:
+    """The interruption on the way to an error; where it is not known, one more."""
+    while error is not None and not isinstance(error, Interrupted):
+        error = error.__cause__ or error.__context__
+    return error or Interrupted(signal.Signals(_asked[0]).name)
 
 
 @contextmanager

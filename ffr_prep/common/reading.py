@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import stat
 import tomllib
+from codecs import BOM_UTF16_BE, BOM_UTF16_LE
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
@@ -18,12 +19,16 @@ _DEEPEST = 40  # tables and lists within each other
 _LARGEST = 1 << 63
 _SHOWN, _LISTED = 200, 5
 _CAD = "a CAD file, of which `ffr-prep reduce` makes a body"
-_ENDINGS = {
+_MESH = "a mesh, of which `ffr-prep reduce` makes a body"
+ENDINGS = {
     ".ffr": "a body file, which a scene names (file = ...) and `ffr-prep info` describes",
     ".nc": "a result file, which `ffr-dyn info`, `plot` and `animate` show",
     ".toml": "a text such as a scene, which `ffr-dyn run` analyses",
     **dict.fromkeys((".step", ".stp", ".iges", ".igs", ".brep", ".geo"), _CAD),
+    **dict.fromkeys((".inp", ".bdf", ".nas", ".msh", ".med", ".unv", ".vtu", ".frd"), _MESH),
 }
+_MARKS = (BOM_UTF16_LE, BOM_UTF16_BE)
+TOO_MANY_DIGITS = "int_max_str_digits"  # in a ValueError of Python for thousands of them
 MANY = 50_000_000  # of numbers that are listed one by one
 
 
@@ -46,7 +51,7 @@ def reading(path: str | Path, what: str, *damage: type[Exception]) -> Iterator[N
     except MemoryError:
         raise InputError(f"{path} announces more than fits in memory: is it {what}, and complete?") from None
     except Exception as error:
-        if "int_max_str_digits" in str(error):  # a ValueError of Python for thousands of digits
+        if TOO_MANY_DIGITS in str(error):
             raise _too_large(path, what) from None
         why = " ".join(f"{type(error).__name__}: {error}".split())[:_SHOWN]
         if isinstance(error, damage):
@@ -62,7 +67,7 @@ def _too_large(path: str | Path, what: str) -> InputError:
 
 def not_of_its_ending(path: str | Path, what: str, fault: str) -> str:
     """Why a file cannot be read as `what`, a kind of file: for one whose ending is of another kind that, else the fault."""
-    kind = _ENDINGS.get(Path(path).suffix.lower(), what)
+    kind = ENDINGS.get(Path(path).suffix.lower(), what)
     return f"{path} {fault}" if kind.startswith(what) else f"{path} is not {what} but, by its ending, {kind}"
 
 
@@ -95,16 +100,16 @@ def nearest_file(path: str | Path) -> str:
 
 
 def read_text(path: str | Path, what: str, most: int = _MOST_TEXT) -> str:
-    """A text in UTF-8, or in Latin-1 where it is not that."""
+    """A text in UTF-8, in UTF-16 where it begins with the mark of that, otherwise in Latin-1."""
     with reading(path, what):
         size = Path(path).stat().st_size
         if size > most:
             raise InputError(f"{path} has {size / 1e6:.0f} MB; {what} has at most {most / 1e6:.0f}")
         content = Path(path).read_bytes()
-        try:
-            return content.decode("utf-8-sig")
-        except UnicodeDecodeError:
-            return content.decode("latin-1")
+        for code in ("utf-16",) if content.startswith(_MARKS) else ("utf-8-sig", "latin-1"):
+            with suppress(UnicodeDecodeError):
+                return content.decode(code)
+        raise InputError(f"{path} begins as text in UTF-16 and is none; write it in UTF-8")
 
 
 def read_toml(path: str | Path, what: str) -> dict[str, Any]:
@@ -114,9 +119,13 @@ def read_toml(path: str | Path, what: str) -> dict[str, Any]:
         if len(text) > _MOST_TOML:
             raise InputError(f"{path} has {len(text) / 1e6:.0f} MB; {what} has at most {_MOST_TOML / 1e6:.0f}")
         try:
-            tree = tomllib.loads(text.decode("utf-8"))
-        except (tomllib.TOMLDecodeError, UnicodeDecodeError, ValueError) as error:  # numbers of too many digits
+            tree = tomllib.loads(text.decode("utf-16" if text.startswith(_MARKS) else "utf-8-sig"))
+        except ValueError as error:
+            if TOO_MANY_DIGITS in str(error):
+                raise _too_large(path, what) from None
             fault = f"is not a readable TOML file: {str(error)[:_SHOWN]}"
+            if isinstance(error, UnicodeDecodeError):
+                fault = "is not text in UTF-8; save it so"
             ours = what if Path(path).suffix.lower() != ".toml" else "a text"
             raise InputError(not_of_its_ending(path, ours, fault)) from None
         _check_tree(path, tree)

@@ -77,7 +77,7 @@ class Registry(Generic[E]):
     def register(self, entry: E) -> None:
         """Add an entry. Raises InputError for a name that is taken, and for another meaning of a known setting."""
         if entry.name in self.entries:
-            raise InputError(f"there is a {self.what} {entry.name!r} already: give it another name")
+            raise InputError(f"the {self.what} {entry.name!r} is there already: give it another name")
         known = {setting.name: setting for setting in self.settings()}
         for setting in settings_of(entry):
             if known.get(setting.name, setting) != setting:

@@ -20,7 +20,7 @@ from ffr_prep.body import BodyError, FlexibleBody, Interface, with_point
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError, InputError
 from ffr_prep.common.outputs import replacing
-from ffr_prep.common.reading import reading
+from ffr_prep.common.reading import read_text
 from ffr_prep.interchange.bare_inertia import judged
 from ffr_prep.model.invariants import skew
 
@@ -290,8 +290,7 @@ def nodal_masses(rows: Array, target: Array) -> tuple[Array, float]:
 
 def read_lines(path: Path) -> list[str]:
     """The lines of a text file. Raises InputError for a file that does not exist or cannot be read."""
-    with reading(path, "a text file"):
-        return path.read_text(encoding="latin-1").splitlines()
+    return read_text(path, "a text file").splitlines()
 
 
 def write_lines(path: Path, lines: Sequence[str]) -> Path:

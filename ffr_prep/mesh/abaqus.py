@@ -11,6 +11,7 @@ order and face numbers).
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -21,6 +22,7 @@ from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 from ffr_prep.common.reading import check_count, read_text
 from ffr_prep.mesh.file_mesh import FileMesh, supported_kind
+from ffr_prep.mesh.left_out import left_out_of_abaqus
 
 Row = list[str]
 
@@ -30,6 +32,8 @@ _HEX_FACES = ((0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 
 _SOLID = re.compile(r"(?:C3D|DC3D|AC3D)(\d+)")
 _PLANE = re.compile(r"(?:S|SC|STRI|CPS|CPE|CPEG|CAX|M3D|SFM3D|R3D|DS|DC2D)(3|4|6|8|9|65)(?!\d)")
 _CORNERS = {3: 3, 6: 3, 65: 3, 4: 4, 8: 4, 9: 4}
+_MAKING = ("NGEN", "NFILL", "NCOPY", "NMAP", "ELGEN", "ELCOPY", "SYSTEM")
+_LISTED = "write the mesh with every node in global axes and every element listed, as programs with a window do"
 _KINDS = {4: "tet4", 10: "tet10", 8: "hex8", 20: "hex20", 27: "hex27"}
 
 
@@ -45,6 +49,7 @@ class _Deck:
     surfaces: dict[str, list[tuple[str, str]]] = field(default_factory=dict)
     spelling: dict[str, str] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
+    found: Counter[str] = field(default_factory=Counter)
     instances: int = 0
 
 
@@ -81,6 +86,9 @@ def _deck(path: Path, readers: Mapping[str, Callable[[_Deck, Mapping[str, str], 
     deck = _Deck()
     try:
         for keyword, parameters, rows in keyword_sections(path):
+            deck.found[f"*{keyword}"] += 1
+            if keyword in _MAKING and (rows or keyword != "SYSTEM"):
+                raise InputError(f"*{keyword} makes nodes or elements, which is not done here: {_LISTED}")
             if keyword in readers:
                 readers[keyword](deck, parameters, rows)
     except (ValueError, KeyError, IndexError, UnicodeDecodeError) as error:
@@ -105,6 +113,8 @@ def keyword_sections(path: Path, above: tuple[Path, ...] = ()) -> Iterator[tuple
         if keyword.upper() == "INCLUDE":
             yield from keyword_sections(path.parent / parameters["INPUT"], (*above, path.resolve()))
         else:
+            if keyword.upper() in ("NODE", "ELEMENT") and "INPUT" in parameters:
+                data = _without_comments(path.parent / parameters["INPUT"])
             yield keyword.upper(), parameters, [_row(line) for line in data.splitlines() if line.strip()]
 
 
@@ -118,6 +128,8 @@ def _row(line: str) -> Row:
 
 
 def _read_nodes(deck: _Deck, parameters: Mapping[str, str], rows: list[Row]) -> None:
+    if parameters.get("SYSTEM", "R").upper() != "R":
+        raise InputError(f"nodes are given in cylindrical or spherical coordinates (SYSTEM): {_LISTED}")
     for number, *coordinates in rows:
         if int(number) in deck.nodes:
             raise InputError(f"node {number} is defined twice; write each part to a file of its own")
@@ -136,7 +148,9 @@ def _read_elements(deck: _Deck, parameters: Mapping[str, str], rows: list[Row]) 
     elif plane:
         target, size = deck.faces, 6 if size == 65 else size
     else:
-        deck.notes.append(f"{len(rows)} elements of type {parameters['TYPE']} are ignored; only solids are reduced")
+        deck.found[kind] += len(rows)
+        if not left_out_of_abaqus({kind: 1}):
+            deck.notes.append(f"{len(rows)} elements of type {parameters['TYPE']} are ignored; only solids are reduced")
         return
     numbers = np.array([int(word) for row in rows for word in row], np.int64).reshape(-1, size + 1).tolist()
     target.update({number: nodes for number, *nodes in numbers})
@@ -221,7 +235,7 @@ def _file_mesh(deck: _Deck) -> FileMesh:
         volumes={deck.spelling[name]: np.unique(of) for name, of in volumes.items() if of},
         faces={deck.spelling[name]: _by_size(index, of) for name, of in corners.items() if of},
         nodes={deck.spelling[name]: np.unique(_indices(index, [of])) for name, of in nodes.items() if of},
-        notes=tuple(deck.notes),
+        notes=(*deck.notes, *left_out_of_abaqus(deck.found)),
     )
 
 

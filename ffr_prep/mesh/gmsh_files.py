@@ -138,12 +138,21 @@ def _arrays(
         "glue": glue,
         "solids": list(solids),
     }
-    with tempfile.TemporaryDirectory(prefix="ffr-gmsh-") as folder:
+    with _temporary() as folder:
         job_file, result = Path(folder, "job.json"), Path(folder, "result.npz")
         job_file.write_text(json.dumps(job | {"path": str(_alone(path, Path(folder)))}))
         _run_gmsh(path, job_file, result)
         with np.load(result) as stored:
             return dict(stored), declared or unit
+
+
+def _temporary() -> tempfile.TemporaryDirectory[str]:
+    try:
+        return tempfile.TemporaryDirectory(prefix="ffr-gmsh-")
+    except OSError as error:
+        raise ComputationError(
+            f"there is no room for temporary files ({error.strerror}); set TMPDIR to a folder with some"
+        ) from None
 
 
 def _alone(path: Path, folder: Path) -> Path:

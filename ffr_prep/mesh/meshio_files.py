@@ -45,7 +45,8 @@ def _read(path: Path) -> meshio.Mesh:
         try:
             return meshio.read(path)
         except (Exception, SystemExit) as error:
-            words = " ".join([f"{type(error).__name__}: {error}", *said.getvalue().split()])
+            first = [] if isinstance(error, SystemExit) else [f"{type(error).__name__}: {error}"]
+            words = " ".join([*first, *said.getvalue().split()])
     fault = f"cannot be read as a mesh ({words}); is it complete, and does its ending name its format?"
     raise InputError(not_of_its_ending(path, "a mesh", fault))
 

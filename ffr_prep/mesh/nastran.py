@@ -17,27 +17,13 @@ from ffr_prep.common.errors import InputError
 from ffr_prep.common.reading import check_count
 from ffr_prep.mesh.bulk_data import Card, cards
 from ffr_prep.mesh.file_mesh import FileMesh, supported_kind
+from ffr_prep.mesh.left_out import left_out_of_nastran
 
 # Nodes of elements and their corners; Nastran has the edges between both faces of a CHEXA before those of the second one.
 _SOLIDS = {"CTETRA": (4, {4: "tet4", 10: "tet10"}), "CHEXA": (8, {8: "hex8", 20: "hex20"})}
 _HEX20 = [*range(12), *range(16, 20), *range(12, 16)]
 _OTHER_SOLIDS = ("CPENTA", "CPYRAM", "CPYRA")
 _FACES = {"CTRIA3": 3, "CTRIA6": 3, "CTRIAR": 3, "CQUAD4": 4, "CQUAD8": 4, "CQUADR": 4, "CQUAD": 4}
-_IGNORED = (
-    "CBAR",
-    "CBEAM",
-    "CROD",
-    "CONROD",
-    "CELAS1",
-    "CELAS2",
-    "CBUSH",
-    "CONM2",
-    "RBE2",
-    "RBE3",
-    "RBAR",
-    "CGAP",
-    "CTUBE",
-)
 _SYSTEMS = ("CORD2R", "CORD2C", "CORD2S")
 _DEEPEST = 40
 
@@ -52,7 +38,7 @@ class _Deck:
     faces: list[tuple[int, list[int]]] = field(default_factory=list)
     sets: dict[int, list[int]] = field(default_factory=dict)
     system: int = 0
-    ignored: Counter[str] = field(default_factory=Counter)
+    found: Counter[str] = field(default_factory=Counter)
 
 
 def from_nastran(path: Path) -> FileMesh:
@@ -64,6 +50,7 @@ def from_nastran(path: Path) -> FileMesh:
     try:
         for card in cards(path):
             _take(deck, card)
+            deck.found["GE" if card.name == "MAT1" and card.text(8) else card.name] += 1
         return _file_mesh(deck)
     except InputError as error:
         text = str(error)
@@ -86,8 +73,6 @@ def _take(deck: _Deck, card: Card) -> None:
         deck.system = card.integer(2, 0)
     elif card.name == "SET1":
         deck.sets[card.integer(1)] = _members(card)
-    elif card.name in _IGNORED:
-        deck.ignored[card.name] += 1
 
 
 def _take_solid(deck: _Deck, card: Card) -> None:
@@ -137,7 +122,7 @@ def _file_mesh(deck: _Deck) -> FileMesh:
         volumes={f"property_{n}": np.flatnonzero(properties == n) for n in np.unique(properties).tolist()},
         faces={f"property_{n}": _by_size(index, of) for n, of in groups.items()},
         nodes={name: of.astype(np.int64) for name, of in sets.items() if of.size},
-        notes=tuple(f"{count} {name} are ignored; only solids are reduced" for name, count in deck.ignored.items()),
+        notes=left_out_of_nastran(deck.found),
     )
 
 

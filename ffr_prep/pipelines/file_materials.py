@@ -25,7 +25,10 @@ from ffr_prep.model.material import Material, Solid, orthotropic
 
 _ABAQUS, _NASTRAN = (".inp",), (".bdf", ".nas", ".fem")
 CARRIERS = (*_ABAQUS, *_NASTRAN)
-_STIFFEST, _SOFTEST = 3e12, 1e4  # Pa
+_STIFFEST, _SOFTEST = (
+    3e12,
+    1e6,
+)  # Pa; what is softer is more often N/mm^2 beside kg/m^3 than a foam, which --material gives
 _LIGHTEST, _HEAVIEST = 20.0, 3e4  # kg/m^3
 _SYSTEMS: Mapping[str, UnitSystem] = {**UNIT_SYSTEMS, "mm-g-ms": UnitSystem(1e-3, 1e-3, 1e-3)}
 

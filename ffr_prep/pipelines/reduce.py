@@ -30,6 +30,7 @@ from ffr_prep.solvers.factor import CHOLESKY, FreeBody, Solver, SupportedBody, s
 from ffr_prep.solvers.threads import on_one_thread
 
 _MASSLESS = 1e-9
+_RIGID = 6  # coordinates of a body that does not deform
 UNDAMPED = Damping()
 
 
@@ -102,6 +103,11 @@ def reduce(
         )
     if request.parts is not None and model.cut is None:
         raise InputError("this model cannot be cut into parts: meshes of solids and frames of beams and plates can")
+    if model.coupled.K.shape[0] <= _RIGID:
+        raise InputError(
+            "every node of the model follows one rigid interface, so that nothing deforms: give it fewer nodes, make it a "
+            "mean one, or make a rigid body (ffr-prep rigid)"
+        )
     reference = at_interfaces(request.reference, model.coupled.names, model.coupled.positions)
     request = replace(request, reference=reference)
     try:

@@ -13,6 +13,7 @@ from ffr_prep.solvers.factor import SupportedBody, solve_refined
 _DENSE = 600
 _WHOLE, _SHOWN_BY_MESH = 1500, 0.3  # free coordinates of which all modes may be wanted; share that a mesh can show
 _FIRST = 12
+_HIGHEST = 1e150  # Hz, of which the square is a number still
 
 
 def normal_modes(model: CoupledModel, held: SupportedBody, count: int) -> tuple[Array, Array]:
@@ -40,7 +41,7 @@ def modes_up_to(model: CoupledModel, held: SupportedBody, frequency: float) -> t
     Raises InputError for a frequency with more modes than the mesh can show, ComputationError when the iteration does not
     converge.
     """
-    limit = (2 * np.pi * frequency) ** 2
+    limit = (2 * np.pi * min(frequency, _HIGHEST)) ** 2
     most = model.K.shape[0] - len(held.C)
     count = min(_FIRST, most)
     omega2, vectors = normal_modes(model, held, count)

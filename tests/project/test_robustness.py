@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from ffr_prep.common.errors import InputError
-from ffr_prep.common.reading import read_toml, reading
+from ffr_prep.common.reading import read_text, read_toml, reading
 
 NAMES = tuple(mutated_inputs.formats())
 
@@ -45,18 +45,34 @@ def test_mutations_repeat_and_change():
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("a = " + "1" * 5000, "readable TOML"),
+        ("a = " + "1" * 5000, "too large for a scene file"),
         ("a = " + "[" * 3000 + "]" * 3000, "nested"),
         ("a = " + "[" * 100 + "]" * 100, "nested"),
         (".".join("a" * 300) + " = 1", "nested"),
         ("[a]\nb = [9223372036854775808]", "a.b is an integer beyond 64 bits"),
-        ("a = '\xff'", "readable TOML"),
+        ("a = '\xff'", "not text in UTF-8; save it so"),
     ],
 )
 def test_toml_that_no_scene_can_be_is_refused(tmp_path, text, words):
     (tmp_path / "a.toml").write_text(text, encoding="latin-1")
     with pytest.raises(InputError, match=words):
         read_toml(tmp_path / "a.toml", "a scene file")
+
+
+@pytest.mark.parametrize("code", ["utf-8", "utf-8-sig", "utf-16"])
+@pytest.mark.parametrize("end", ["\n", "\r\n"])
+def test_texts_are_read_however_they_were_saved(tmp_path, code, end):
+    path = tmp_path / "a.toml"
+    path.write_bytes(f"name = 'm\u00fcll'{end}[b]{end}c = 1{end}".encode(code))
+    assert read_toml(path, "a scene file") == {"name": "m\u00fcll", "b": {"c": 1}}
+    assert read_text(path, "a text").splitlines() == ["name = 'm\u00fcll'", "[b]", "c = 1"]
+
+
+def test_half_a_letter_of_utf_16_is_refused(tmp_path):
+    path = tmp_path / "a.inp"
+    path.write_bytes("ab".encode("utf-16")[:-1])
+    with pytest.raises(InputError, match="write it in UTF-8"):
+        read_text(path, "a text")
 
 
 def test_errors_that_nobody_has_thought_of_ask_for_a_report(tmp_path):

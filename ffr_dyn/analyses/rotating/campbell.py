@@ -56,6 +56,10 @@ class Campbell(OfMoment):
     picture: str = field(default="", metadata=option("--picture", "Draw the diagram, .png or .svg.", metavar="FILE"))
 
     def perform(self, scene: Scene, settings: MomentSettings, **how: Any) -> Result:
+        if self.picture:
+            from ffr_dyn.pictures.histories import check_picture
+
+            check_picture(self.picture)
         orders = tuple(_order(text) for text in self.orders)
         found = campbell(
             scene, speeds=speed_list(self.speeds), turn=self.turn, orders=orders, modes=self.modes, time=settings.time,

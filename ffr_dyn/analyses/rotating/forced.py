@@ -73,6 +73,10 @@ class Forced(OfMoment):
     picture: str = field(default="", metadata=option("--picture", "Draw amplitudes.", metavar="FILE"))
 
     def perform(self, scene: Scene, settings: MomentSettings, **how: Any) -> Result:
+        if self.picture:
+            from ffr_dyn.pictures.histories import check_picture
+
+            check_picture(self.picture)
         found = forced(
             scene, input=self.input, amplitude=self.amplitude, outputs=self.quantities, band_of=_band(self.band, self.down),
             steps=self.steps, about=self.about, path=how["path"],

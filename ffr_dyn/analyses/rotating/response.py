@@ -69,7 +69,10 @@ class Response(OfMoment):
 
     def perform(self, scene: Scene, settings: MomentSettings, **how: Any) -> Result:
         from ffr_dyn.pictures.bode import draw_bode, draw_nyquist
+        from ffr_dyn.pictures.histories import check_picture
 
+        for file in filter(None, (self.bode, self.nyquist)):
+            check_picture(file)
         found = response(
             scene, input=self.input, outputs=self.quantities, band_of=band_in_words(self.band), psd=_psd(self.psd),
             about=self.about, time=settings.time, path=how["path"],

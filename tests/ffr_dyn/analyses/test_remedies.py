@@ -6,11 +6,10 @@ them all, those of other folders than the analyses by the tables of tests/ffr_dy
 
 from __future__ import annotations
 
-import ast
 import os
 import re
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
@@ -27,8 +26,8 @@ import result_cases
 import scene_cases
 import study_cases
 from ffr_gallery.bodies import bar
-from places import ROOT
-from remedy import CLOUD, DOUBLE, DRIVEN, GROUND, HINGED, TURNING, Case, run
+from remedy import CLOUD, DOUBLE, DRIVEN, GROUND, HINGED, TURNING, run
+from said import Case, texts_of
 from synthetic import cloud
 from test_analyses_inverse import flexible_arm
 from test_analyses_kinematic import slider_crank
@@ -94,9 +93,6 @@ from ffr_dyn.scene.joints import Joint
 from ffr_dyn.scene.scene import Body, Scene, marker_number
 from ffr_dyn.scene.sensors import Measurement, SectionMeasurement
 from ffr_prep.common.errors import ComputationError, InputError
-
-ERRORS = ("InputError", "ComputationError", "OpenError")
-LEAST = 12  # letters of its own that a text has; one with fewer is made by a function
 
 # What is a part of a message, or one made elsewhere.
 PARTS = {
@@ -891,33 +887,7 @@ CASES = (
 @cache
 def texts() -> dict[str, tuple[re.Pattern[str], ...]]:
     """What each module says, as patterns."""
-    found = {}
-    for path in sorted((ROOT / "ffr_dyn").rglob("*.py")):
-        module = path.relative_to(ROOT / "ffr_dyn").as_posix()
-        said = [_pattern(node) for node in _said(ast.parse(path.read_text(encoding="utf-8")), PARTS.get(module, ()))]
-        if kept := tuple(re.compile(one, re.DOTALL) for one in said if len(re.sub(r"\W", "", one)) >= LEAST):
-            found[module] = kept
-    return found
-
-
-def _said(tree: ast.Module, parts: tuple[str, ...]) -> Iterator[ast.expr]:
-    """The texts of all errors, and all texts that the functions `parts` make."""
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in ERRORS and node.args:
-            yield node.args[0]
-        if isinstance(node, ast.FunctionDef) and node.name in parts:
-            yield from (one.value for one in ast.walk(node) if isinstance(one, ast.Return) and one.value is not None)
-
-
-def _pattern(node: ast.expr) -> str:
-    """What is not written in the source may be anything."""
-    if isinstance(node, ast.Constant):
-        return re.escape(str(node.value))
-    if isinstance(node, ast.JoinedStr):
-        return "".join(map(_pattern, node.values))
-    if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Add):
-        return _pattern(node.left) + _pattern(node.right)
-    return ".*"
+    return texts_of("ffr_dyn", PARTS)
 
 
 @cache

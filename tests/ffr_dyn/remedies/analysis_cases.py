@@ -14,7 +14,8 @@ from unittest.mock import patch
 import h5py
 import numpy as np
 from ffr_gallery.bodies import bar, beam
-from remedy import CLOUD, DOUBLE, DRIVEN, GROUND, HINGED, Case, run
+from remedy import CLOUD, DOUBLE, DRIVEN, GROUND, HINGED, run
+from said import Case
 from synthetic import cloud
 from test_analyses_kinematic import slider_crank
 from test_analyses_mixed import (
@@ -97,6 +98,7 @@ def continued(settings: object) -> Result:
 
 LONGER = Settings(start=0.0, end=0.2, output_step=0.01, method=ROS2(1e-3))
 RESUMED = [
+    Case(p(run, DRIVEN, ROS2(1e-20)), p(run, DRIVEN, ROS2(1e-3))),
     Case(p(resumed, lambda content: content[:50]), p(run, DRIVEN, end=0.2)),
     Case(p(resumed, older), p(run, DRIVEN, end=0.2)),
     Case(p(continued, MomentSettings()), p(continued, LONGER)),

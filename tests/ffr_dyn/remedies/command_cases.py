@@ -11,7 +11,8 @@ from tempfile import TemporaryDirectory
 from unittest.mock import patch
 
 import numpy as np
-from remedy import CLOUD, DRIVEN, DRIVER, HINGED, SCENE, Case, command
+from remedy import CLOUD, DRIVEN, DRIVER, HINGED, SCENE, command
+from said import Case
 from test_parts_command import CLAMPED, STRIP
 
 import ffr_dyn as fd
@@ -105,6 +106,7 @@ COMMANDS = [
     ),
     Case(p(command, CHART, text=STATIC), chart),
     Case(p(charted, "clod"), p(charted, "cloud=swing.cloud.ffr")),
+    Case(p(command, "parts rod.toml"), p(parted, "reduce-structure strip.toml")),
     Case(p(parted, "reduce-structure far.toml"), p(parted, "reduce-structure strip.toml")),
     Case(p(command, CHART + " --end -1"), chart),
     Case(p(command, CHART.replace("1e-2", "0")), chart),

@@ -10,7 +10,8 @@ from tempfile import TemporaryDirectory
 from unittest.mock import patch
 
 from ffr_gallery.bodies import beam
-from remedy import CLOUD, DOUBLE, HINGED, Case, run, stressed
+from remedy import CLOUD, DOUBLE, HINGED, run, stressed
+from said import Case
 from synthetic import cloud
 
 from ffr_dyn.analyses.events import Event

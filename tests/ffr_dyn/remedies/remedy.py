@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Callable
 from contextlib import chdir
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -23,15 +22,6 @@ from ffr_dyn.scene.scene import Body, Scene
 from ffr_prep.body import FlexibleBody
 from ffr_prep.common.interrupts import ending_in_order
 from ffr_prep.common.outputs import command_inputs
-
-
-@dataclass(frozen=True)
-class Case:
-    """What raises a text, and what the text says to do instead."""
-
-    raised: Callable[[], object]
-    mended: Callable[[], object]
-
 
 GROUND = {"O": (0, 0, 0), "P": (0.9, 0, 0), "Q": (1, 2, 0)}
 HINGED = Scene((Body("bar", bar("bar")),), (Joint("hinge", "revolute", "ground.O", "bar.a"),), ground=GROUND)

@@ -14,7 +14,8 @@ from unittest.mock import patch
 
 import h5py
 import numpy as np
-from remedy import CLOUD, HINGED, Case, command, run, stressed
+from remedy import CLOUD, HINGED, command, run, stressed
+from said import Case
 from synthetic import cloud
 
 from ffr_dyn.integrators import ROS2

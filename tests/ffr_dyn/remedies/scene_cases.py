@@ -10,7 +10,8 @@ from unittest.mock import patch
 import numpy as np
 from boxes import STEEL, box_mesh
 from ffr_gallery.bodies import beam
-from remedy import CLOUD, DOUBLE, HINGED, Case, run
+from remedy import CLOUD, DOUBLE, HINGED, run
+from said import Case
 from synthetic import cloud
 
 import ffr_dyn as fd

@@ -11,7 +11,7 @@ from tempfile import TemporaryDirectory
 from unittest.mock import patch
 
 import numpy as np
-from remedy import Case
+from said import Case
 from test_parts_command import CLAMPED
 from test_sweep import SCENE
 

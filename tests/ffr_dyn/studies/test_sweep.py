@@ -17,9 +17,10 @@ import ffr_dyn as fd
 import ffr_prep.cli
 from ffr_dyn.studies.draw import running_mean, tornado
 from ffr_dyn.studies.measures import attribute, measured
-from ffr_dyn.studies.runs import body_file
+from ffr_dyn.studies.runs import Row, body_file
 from ffr_dyn.studies.table import Journal, journal_of
 from ffr_prep.common.errors import ComputationError, InputError
+from ffr_prep.common.outputs import reserved
 
 SCENE = """
 gravity = [0, "-g", 0]
@@ -144,6 +145,29 @@ def test_a_study_that_was_stopped_goes_on_to_the_same_bits(folder):
     assert done[0] == 5
     assert done[-1] == 12
     assert (folder / "t.nc").read_bytes() == (folder / "whole.nc").read_bytes()
+
+
+@pytest.mark.parametrize(
+    "line", [b"[]", b"{}", b"3", b'{"run": 99, "values": {}, "message": ""}', b"{" * 9000, b"\xff"]
+)
+def test_runs_behind_a_damaged_line_are_done_again(folder, line):
+    study = fd.load_study(folder / "study.toml")
+    whole = fd.sweep(study, folder / "whole.nc", workers=0)
+    rows = [Row(k, {name: float(y[k]) for name, y in whole.outputs.items()}) for k in range(len(whole))]
+    with Journal(folder / "t.nc", study) as journal:
+        journal.add(rows)
+    lines = journal_of(folder / "t.nc").read_bytes().split(b"\n")
+    journal_of(folder / "t.nc").write_bytes(b"\n".join([*lines[:3], line, *lines[4:]]))
+    with Journal(folder / "t.nc", study) as journal:
+        assert sorted(journal.rows) == [0, 1]
+    fd.sweep(study, folder / "t.nc", workers=0)
+    assert (folder / "t.nc").read_bytes() == (folder / "whole.nc").read_bytes()
+
+
+def test_a_second_study_to_one_output_is_refused(folder):
+    with reserved(folder / "t.nc"), pytest.raises(fd.InputError, match="being written by another run"):
+        fd.sweep(folder / "study.toml", folder / "t.nc", workers=0)
+    assert not journal_of(folder / "t.nc").exists()
 
 
 def test_workers_make_the_same_file(folder):

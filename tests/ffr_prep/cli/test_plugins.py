@@ -203,7 +203,7 @@ def test_a_matrix_and_an_exchange_format_of_ones_own(tmp_path, capsys):
 def test_names_and_settings_have_one_meaning(polynomials):
     load_plugin(polynomials)
     load_plugin(polynomials)  # once only
-    with pytest.raises(InputError, match="there is a reduction 'krylov' already"):
+    with pytest.raises(InputError, match="the reduction 'krylov' is there already"):
         REDUCTIONS.register(ReductionMethod("krylov", dict, "another"))
     with pytest.raises(InputError, match="its setting 'moments' means something else"):
         REDUCTIONS.register(ReductionMethod("mine", dict, "mine", settings=(Setting("moments", float, 1.0, "Mine."),)))

@@ -232,6 +232,16 @@ def test_a_signal_in_a_destructor_is_not_lost():
         done.append("forgotten with its block")
 
 
+@pytest.mark.parametrize("known", [True, False])
+def test_what_fails_by_a_signal_is_an_interruption(known):
+    """As a library does that is loaded just then."""
+    with pytest.raises(Interrupted, match="SIGTERM"), ending_in_order():  # noqa: PT012 - what happens within is the test
+        try:
+            signal.raise_signal(signal.SIGTERM)
+        except KeyboardInterrupt as struck:
+            raise ImportError("initialization failed") from (struck if known else None)
+
+
 def test_what_the_process_ignores_stays_ignored():
     before = signal.signal(signal.SIGHUP, signal.SIG_IGN)  # as under nohup
     try:

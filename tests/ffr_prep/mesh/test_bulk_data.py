@@ -112,7 +112,29 @@ def test_faces_sets_and_what_is_ignored(tmp_path):
     fp.check_mesh(mesh)
     assert [part.shape for part in mesh.face_groups["property_9"]] == [(1, 4)]
     assert mesh.node_groups["set_5"].tolist() == [0, 1, 2, 3]
-    assert "1 CBAR are ignored; only solids are reduced" in mesh.notes
+    (note,) = mesh.notes
+    assert note.startswith("1 CBAR left out: beams, bars and rods; only solids are reduced; a structure file")
+
+
+@pytest.mark.parametrize(
+    ("more", "told"),
+    [
+        ("CDAMP1,9,1,1,1\nCBUSH,10,1,1,2\nCVISC,11,1,1,2", "1 CDAMP1, 1 CBUSH, 1 CVISC left out: springs and dashpots"),
+        ("CONM2,9,1,0,2.5", "1 CONM2 left out: masses"),
+        ("RBE2,9,1,123,2,3\nRBE3,10,,1,123,1.,123,2,3", "1 RBE2, 1 RBE3 left out: rigid and averaging"),
+        ("PSHELL,9,1,0.1,1", "1 PSHELL left out: shells and membranes"),
+        ("SPC1,1,123,1\nSPC,1,2,123", "1 SPC1, 1 SPC left out: supports"),
+        ("FORCE,1,1,0,1.,1.,0.,0.", "1 FORCE left out: loads"),
+        ("BGSET,1,1,2,3", "1 BGSET left out: connections of parts"),
+        ("MAT1,5,2.1+11,,.3,7850.,,,0.02", "1 GE left out: damping"),
+        ("DMIG,K2GG,0,6,1,0", "1 DMIG left out: matrices"),
+    ],
+)
+def test_cards_that_would_change_the_body_are_told(tmp_path, more, told):
+    text = deck(box("tet4"), "tet4", free).replace("ENDDATA", f"PARAM,POST,-1\nPSOLID,7,5\n{more}\nENDDATA", 1)
+    (tmp_path / "a.bdf").write_text(text)
+    (note,) = fp.read_mesh(tmp_path / "a.bdf").notes
+    assert note.startswith(told)
 
 
 def test_points_in_cylindrical_and_turned_systems(tmp_path):

@@ -546,8 +546,56 @@ def test_abaqus_files_that_cannot_be_used(deck, old, new, message):
 
 
 def test_abaqus_elements_that_are_no_solids_are_noted(deck):
-    mesh = read_mesh(deck(DECK + "*Element, type=B31\n90, 1, 2\n"))
-    assert "1 elements of type B31 are ignored; only solids are reduced" in mesh.notes
+    mesh = read_mesh(deck(DECK + "*Element, type=AC1D2\n90, 1, 2\n"))
+    assert "1 elements of type AC1D2 are ignored; only solids are reduced" in mesh.notes
+
+
+@pytest.mark.parametrize(
+    ("card", "start", "remedy"),
+    [
+        ("*Element, type=B31\n90, 1, 2\n", "1 B31 left out: beams", "structure file"),
+        ("*Element, type=DASHPOTA\n90, 1, 2\n91, 2, 3\n", "2 DASHPOTA left out: springs and dashpots", "[springs]"),
+        ("*Element, type=SpringA\n90, 1, 2\n", "1 SPRINGA left out: springs and dashpots", "scene"),
+        ("*Element, type=MASS\n90, 1\n*Element, type=ROTARYI\n91, 1\n", "1 MASS, 1 ROTARYI left out: masses", "scene"),
+        ("*Coupling, ref node=1\n*Kinematic\n", "1 *COUPLING left out: rigid", "interface"),
+        ("*MPC\nBEAM, 1, 2\n*Equation\n2\n1, 1, 1., 2, 1, -1.\n", "1 *MPC, 1 *EQUATION left out: rigid", "interface"),
+        ("*Tie, name=t\na, b\n", "1 *TIE left out: connections", "share nodes"),
+        ("*Boundary\n1, 1, 3\n", "1 *BOUNDARY left out: supports", "--reference"),
+        ("*Cload\n1, 1, 3.\n", "1 *CLOAD left out: loads", "scene"),
+        ("*Shell Section, elset=Both\n1.\n", "1 *SHELL SECTION left out: shells", "as faces"),
+        ("*Material, name=m\n*Damping, alpha=2.\n", "1 *DAMPING left out: damping", "--rayleigh"),
+        ("*User Element, nodes=2\n", "1 *USER ELEMENT left out: matrices", "reduce-matrices"),
+    ],
+)
+def test_abaqus_cards_that_would_change_the_body_are_told(deck, card, start, remedy):
+    (note,) = set(read_mesh(deck(DECK + card)).notes) - set(read_mesh(deck(DECK)).notes)
+    assert note.startswith(start)
+    assert remedy in note
+
+
+@pytest.mark.parametrize(
+    "card", ["*Ngen\n1, 3, 1\n", "*Elcopy, old set=a\n", "*Nfill\na, b, 2, 1\n", "*System\n1, 0, 0\n"]
+)
+def test_abaqus_cards_that_make_nodes_are_refused(deck, card):
+    with pytest.raises(
+        InputError, match="makes nodes or elements, which is not done here: write the mesh with every node"
+    ):
+        read_mesh(deck(DECK + card))
+
+
+def test_abaqus_nodes_in_cylindrical_coordinates_are_refused(deck):
+    with pytest.raises(InputError, match="cylindrical or spherical coordinates"):
+        read_mesh(deck(DECK.replace("*Node", "*Node, system=C", 1)))
+
+
+def test_abaqus_nodes_and_elements_in_files_of_their_own(deck, tmp_path):
+    path = deck(DECK)
+    first, _, others = path.read_text().partition("*NODE\n")
+    rows, mark, others = others.partition("*Element")
+    (tmp_path / "nodes.txt").write_text("** of another program\n" + rows)
+    split = tmp_path / "split.inp"
+    split.write_text(f"{first}*Node, input=nodes.txt\n{mark}{others}")
+    np.testing.assert_array_equal(read_mesh(split).points, read_mesh(path).points)
 
 
 # ---- geometry through gmsh ----------------------------------------------------------------------------------------

@@ -1,0 +1,93 @@
+"""What mesh decks hold beside solids that would change a body: nothing of it is passed over without a word.
+
+A mesh becomes a body of solid elements alone. What else has stiffness, mass or damping, holds parts together or holds them
+fast is told with the place where it belongs: the scene, a structure file, interfaces, the matrices of the whole.
+
+Source: Abaqus Keywords Reference Guide; CalculiX CrunchiX user's manual, section "Input deck format"; MSC Nastran Quick
+Reference Guide, section 5.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class _Kind:
+    """Cards by patterns of their names; what they are, and where they belong."""
+
+    names: str
+    what: str
+    remedy: str
+
+
+_SPRINGS = ("springs and dashpots", "between interfaces they are [springs] and [forces] of a scene")
+_MASSES = ("masses", "at an interface they are a rigid body of a scene on a fixed joint; otherwise change a density")
+_BEAMS = (
+    "beams, bars and rods",
+    "only solids are reduced; a structure file joins them with solids (docs/structural.md)",
+)
+_SHELLS = (
+    "shells and membranes",
+    "they serve as faces, without stiffness and mass; a structure file joins them with solids (docs/structural.md)",
+)
+_RIGID = ("rigid and averaging connections", "make their nodes an interface, rigid or mean")
+_JOINED = ("connections of parts", "let the parts share nodes, or join them as parts of a structure file")
+_SUPPORTS = ("supports", "they are joints of a scene; --reference says how the body is held for its modes")
+_LOADS = ("loads", "they belong to a scene")
+_DAMPING = ("damping", "give it by --rayleigh, --loss-factor or --damping (docs/materials.md)")
+_MATRICES = ("matrices", "take K and M of the whole model: ffr-prep reduce-matrices (docs/matrices.md)")
+
+# Keywords with their star, types of elements without.
+_ABAQUS = (
+    _Kind(r"(SPRING|DASHPOT|CONN|JOINTC|GAP|ITT|ITS)[A-Z0-9]*", *_SPRINGS),
+    _Kind(r"MASS|ROTARYI|HEATCAP|\*NONSTRUCTURAL MASS|\*MASS ADJUST", *_MASSES),
+    _Kind(r"(B|PIPE|ELBOW|FRAME|T)\d[A-Z0-9]*", *_BEAMS),
+    _Kind(r"\*(SHELL|MEMBRANE|SHELL GENERAL) SECTION", *_SHELLS),
+    _Kind(
+        r"DCOUP3D|\*RIGID BODY|\*(KINEMATIC |DISTRIBUTING )?COUPLING|\*MPC|\*EQUATION|\*RIGID FACE|(R2D|R3D|RB2D|RB3D)\d",
+        *_RIGID,
+    ),
+    _Kind(
+        r"\*TIE|\*CONTACT( PAIR)?|\*CLEARANCE|\*EMBEDDED ELEMENT|\*SHELL TO SOLID COUPLING|\*FASTENER|\*PRE-TENSION SECTION"
+        r"|\*CYCLIC SYMMETRY MODEL|\*MULTI-POINT CONSTRAINT",
+        *_JOINED,
+    ),
+    _Kind(r"\*BOUNDARY|\*BOUNDARYF", *_SUPPORTS),
+    _Kind(r"\*(CLOAD|DLOAD|DSLOAD|TEMPERATURE|BASE MOTION|CFLUX|DFLUX|CENTRIF)", *_LOADS),
+    _Kind(r"\*(DAMPING|GLOBAL DAMPING|MODAL DAMPING|DASHPOT DAMPING)", *_DAMPING),
+    _Kind(r"U\d+|\*(USER ELEMENT|SUBSTRUCTURE PROPERTY|MATRIX ASSEMBLE|MATRIX INPUT)", *_MATRICES),
+)
+_NASTRAN = (
+    _Kind(r"CELAS\d|CDAMP\d|CVISC|CBUSH(1D|2D)?|CGAP|CWELD|CFAST|CSEAM", *_SPRINGS),
+    _Kind(r"CONM[12]|CMASS\d|NSM[1L]?|NSML1|NSMADD", *_MASSES),
+    _Kind(r"CBAR|CBEAM3?|CROD|CONROD|CTUBE|CBEND", *_BEAMS),
+    _Kind(r"PSHELL|PCOMPG?|PSHEAR|CSHEAR", *_SHELLS),
+    _Kind(r"RBE[123]|RBAR1?|RROD|RTRPLT1?|RSPLINE|RJOINT|RSSCON|MPC", *_RIGID),
+    _Kind(r"BCONP|BCTABLE|BCTABL1|BCTSET|BGSET|BCONECT|BCONPRG", *_JOINED),
+    _Kind(r"SPC1?|SPCD", *_SUPPORTS),
+    _Kind(r"FORCE[12]?|MOMENT[12]?|PLOAD[1245]?|GRAV|RFORCE|TEMPD?|SLOAD|ACCEL1?", *_LOADS),
+    _Kind(r"GE", *_DAMPING),
+    _Kind(r"GENEL|DMIG|DMIAX", *_MATRICES),
+)
+
+
+def left_out_of_abaqus(found: Mapping[str, int]) -> tuple[str, ...]:
+    """Notes on keywords ("*TIE") and types of elements ("B31") of a deck, by how many of each there are."""
+    return _told(found, _ABAQUS)
+
+
+def left_out_of_nastran(found: Mapping[str, int]) -> tuple[str, ...]:
+    """Notes on cards of bulk data, by how many of each there are."""
+    return _told(found, _NASTRAN)
+
+
+def _told(found: Mapping[str, int], kinds: tuple[_Kind, ...]) -> tuple[str, ...]:
+    notes = []
+    for kind in kinds:
+        here = [name for name in found if re.fullmatch(kind.names, name)]
+        if here:
+            notes.append(f"{', '.join(f'{found[name]} {name}' for name in here)} left out: {kind.what}; {kind.remedy}")
+    return tuple(notes)

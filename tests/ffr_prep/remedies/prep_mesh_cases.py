@@ -1,0 +1,201 @@
+"""What is said of meshes, of the files that they come from, of geometries and of regions of them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from unittest.mock import patch
+
+import numpy as np
+from prep_remedy import box, edited, rewritten, with_files, words
+from said import Case
+
+import ffr_prep as fp
+from ffr_prep.mesh.mesh import check_mesh, read_mesh
+from ffr_prep.mesh.time_limit import mesher_time_limit
+from ffr_prep.pipelines.file_materials import file_materials
+from ffr_prep.structures.frame import Frame
+
+p = partial
+PLAIN = box()
+HEX = PLAIN.blocks[0].nodes
+
+
+def changed(**how: object) -> Case:
+    return Case(p(check_mesh, replace(PLAIN, **how)), p(check_mesh, PLAIN))
+
+
+def moved(node: int, at: object) -> np.ndarray:
+    points = PLAIN.points.copy()
+    points[node] = at
+    return points
+
+
+def blocks(nodes: np.ndarray, kind: str = "hex8") -> tuple[fp.Block, ...]:
+    return (fp.Block(kind, nodes),)
+
+
+TWO = np.vstack([PLAIN.points, PLAIN.points + 3])
+SEAM = np.vstack([PLAIN.points, PLAIN.points[4:8]])
+OPENED = HEX.copy()
+OPENED[1] = np.where((HEX[1] >= 4) & (HEX[1] < 8), HEX[1] + 8, HEX[1])
+HINGED = np.vstack([PLAIN.points, PLAIN.points + np.array((1.0, 0.2, 0.1))])
+AT_CORNER = np.where(HEX + 12 == 12, 11, HEX + 12)
+MESHES = [
+    changed(blocks=()),
+    changed(blocks=blocks(HEX, "hex9")),
+    changed(points=moved(0, np.nan)),
+    changed(blocks=blocks(HEX + 3)),
+    changed(points=TWO),
+    changed(volume_groups={"a": np.zeros(0, int)}),
+    changed(blocks=blocks(HEX[[0, 0, 1]])),
+    changed(points=moved(0, PLAIN.points[11])),
+    changed(points=PLAIN.points * [1, 1, -1]),
+    changed(points=SEAM, blocks=blocks(OPENED)),
+    changed(points=TWO, blocks=blocks(np.vstack([HEX, HEX + 12]))),
+    changed(points=np.delete(HINGED, 12, axis=0), blocks=blocks(np.vstack([HEX, AT_CORNER - (AT_CORNER > 12)]))),
+]  # fmt: skip
+
+
+def mesh(**how: object) -> object:
+    return with_files(lambda: check_mesh(read_mesh("block.inp", **how)), {})
+
+
+def shown(line: str, right: str = "mesh block.inp") -> Case:
+    return words(line, right)
+
+
+def of(name: str, *changes: tuple[str, str]) -> Case:
+    return edited(read_mesh, name, *changes)
+
+
+def materials(path: Path) -> object:
+    return file_materials(path, read_mesh(path))
+
+
+def limited(seconds: float) -> None:
+    with mesher_time_limit(seconds):
+        pass
+
+
+REQUESTS = [
+    Case(p(mesh, unit="yd"), p(mesh, unit="mm")),
+    Case(p(mesh, size=3.0), mesh),
+    Case(p(mesh, size=-3.0), mesh),
+    Case(p(mesh, order=3), mesh),
+    Case(p(mesh, numbers={"w": 1.0}), mesh),
+    Case(p(mesh, glue=True), mesh),
+    Case(p(mesh, most_elements=0.0), mesh),
+    Case(p(limited, -1.0), p(limited, 600.0)),
+]
+FRD_HEAD = f"    2C{4:30}{1:38}"
+DECKS = [
+    of("block.inp", ("*NODE", "*NGEN\n1, 3, 1\n*NODE")),
+    of("block.inp", ("*NODE", "*NODE, SYSTEM=C")),
+    of("block.inp", ("1, 0.0", "1, zero")),
+    of("block.inp", ("1, 0.0", "2, 0.0")),
+    of("block.inp", ("C3D8, ELSET=ALL\n1, 1,", "C3D8, ELSET=ALL\n1, 99,")),
+    of("block.inp", ("*NODE", "*INCLUDE, INPUT=block.inp\n*NODE")),
+    of("block.inp", ("*NODE", "*INSTANCE, NAME=a, PART=p\n1., 0., 0.\n*NODE")),
+    of("block.inp", ("TYPE=C3D8", "TYPE=C3D6")),
+    of("block.inp", ("TYPE=C3D8", "TYPE=B31")),
+    rewritten(
+        read_mesh,
+        "fields.bdf",
+        (("BEGIN BULK\n", "BEGIN BULK\n+A1     7\n"),),
+        (),
+    ),
+    of("fields.bdf", ("GRID,4,", "GRID,x,")),
+    of("fields.bdf", ("1.+0", "one")),
+    of("fields.bdf", ("GRID,4,", "GRID,2,")),
+    of("fields.bdf", ("BEGIN BULK", "BEGIN BULK\nINCLUDE 'fields.bdf'")),
+    of("fields.bdf", ("       4\nSET1", "\nSET1")),
+    of("fields.bdf", ("       4\nSET1", "       9\nSET1")),
+    of("fields.bdf", ("GRID,4,,", "GRID,4,7,")),
+    of("fields.bdf", (",1.,0.,0.\n", ",0.,0.,2.\n")),
+    of("mesh.frd", (" -1         1 0.00000E+00", " -1         1 zero        ")),
+    of("mesh.frd", (" -2         1", " -2         9")),
+    of("mesh.frd", (FRD_HEAD, FRD_HEAD[:-1] + "2")),
+    of("mesh.frd", (" -1         1    3", " -1         1    2")),
+    of("mesh.vtu", ("VTKFile", "VTK")),
+]  # fmt: skip
+MATERIALS = [
+    edited(materials, "block.inp", ("MATERIAL=STEEL", "MATERIAL=BRASS")),
+    edited(materials, "block.inp", ("2.1e11", "2.1e5")),
+    edited(materials, "block.inp", ("*DENSITY\n7850.\n", "")),
+    edited(materials, "block.inp", ("SECTION, ELSET", "SECTION, ORIENTATION=o, ELSET")),
+    edited(materials, "block.inp", ("*ELASTIC", "*ELASTIC, TYPE=LAMINA")),
+    edited(materials, "block.inp", ("2.1e11", "stiff")),
+    Case(
+        lambda: with_files(lambda: file_materials("mesh.vtu", read_mesh("mesh.vtu")), {}),
+        lambda: with_files(lambda: materials(Path("block.inp")), {}),
+    ),
+]
+
+# ---- geometries ---------------------------------------------------------------------------------------------------------
+
+MESHED = "mesh part.geo --size 1 --order 1"
+
+
+def crowded() -> object:
+    """A mesh where no folder has room for temporary files."""
+    with patch("tempfile.TemporaryDirectory", side_effect=OSError(28, "No space left on device")):
+        read_mesh("part.geo", size=1.0)
+
+
+GEOMETRIES = [
+    Case(
+        lambda: with_files(lambda: crowded(), {}),
+        lambda: with_files(lambda: read_mesh("part.geo", size=1.0, order=1), {}),
+    ),
+    shown(f"{MESHED} --glue", MESHED),
+    shown("mesh table.csv"),
+    words("mesh other.step", MESHED, other_step="no STEP\n"),
+    words(f"{MESHED} --set width=3", f"{MESHED} --set w=0.3"),
+    words("mesh bad.geo", MESHED, bad_geo="Box(1) = {0, 0, 0, 1, 1, 1};"),
+    words("mesh bad.geo", MESHED, bad_geo="Box(1) = {0, 0;\n"),
+    words("mesh bad.geo", MESHED, bad_geo='Merge "other.iges";\n'),
+]
+
+# ---- regions ------------------------------------------------------------------------------------------------------------
+
+
+def found(query: str, right: str = "plane x=1") -> Case:
+    return words(f"faces block.inp --find '{query}'", f"faces block.inp --find '{right}'")
+
+
+REGIONS = [
+    found("plane x=1+"),
+    found("surface_4..1", "patch_1..4"),
+    found("nearest 1,0", "nearest 1,0.1,0.05"),
+    found("plane x=1 hot"),
+    found("plane x=1 x=1"),
+    found("plane normal=0,0,0", "plane normal=1,0,0 x=1"),
+    found("cylinder r=1kg at 0,0,0"),
+    found("patsh*", "patch*"),
+    found("patsh_1", "patch_1"),
+    found("plane x=2"),
+    found("nearest 0,0,0", "patch_1"),
+    found("plane", "all plane"),
+    found("nearest 900,0,0", "nearest 1,0.1,0.05"),
+]
+
+# ---- regions of nodes -----------------------------------------------------------------------------------------------------
+
+
+def frame() -> Frame:
+    from matrix_models import rod
+
+    return rod(fp.rectangle(0.02, 0.05), 1.0, 2)
+
+
+def at_nodes(query: str) -> object:
+    return fp.from_frame(frame(), [fp.InterfaceRegion("a", query)])
+
+
+NODES = [
+    Case(p(at_nodes, query), p(at_nodes, "nearest 1,0,0"))
+    for query in ("tpi", "sphere r=1", "plane x=0.3", "nearest 9,0,0", "nearest 0.25,0,0")
+]
+CASES = MESHES + REQUESTS + DECKS + MATERIALS + GEOMETRIES + REGIONS + NODES
