@@ -79,10 +79,8 @@ from ffr_dyn.kernels.tables import (
 )
 from ffr_dyn.kernels.vectors import add_scaled, copy, fill
 
-PASSES, SETTLES = (
-    20,
-    0.9,
-)  # at most, where rows depend on one another; of what is left, to which a pass brings it no more
+PASSES = 20  # at most, where rows depend on one another
+SETTLES = 0.9  # of what is left: a pass that leaves more is the last
 GROSS = 1.0  # m, -: of a violation that no projection puts right
 SETTLING, SETTLED = 60, 1e-11  # iterations with a damping matrix, and the relative change at which they end
 UNMET = 1e3  # tolerances, beyond which a violation that the projection does not take back is no drift
