@@ -41,7 +41,6 @@ MARGIN = 2.0  # by which a trial aims below the accuracy
 PROJECTED = (
     1e-8  # of the accuracy [m, -], that constraints are closed to: 1e-9 m moved forces by up to 1e-3 of their range
 )
-LONGER = 2.0  # of the step: the second twin of a method of higher order
 SURE = 2  # order that linearly implicit methods keep where elastic forces are stiff
 SLOW = 0.7  # a ringing output's error falls slower than the step to this power,
 IN_COMPANY = 1.4  # or to this one, if it is of vibration, where others ring
@@ -302,7 +301,7 @@ def _further(
         known = [Beside(near.result, ratio), *(Beside(one.result, ratio * one.ratio) for one in near.twins[:1])]
         return [lambda say, one=one: one for one in known[: 1 if _share(method) == 1.0 else 2]]  # type: ignore[misc]
     others: list[Callable[[Say], Beside | None]] = [lambda say: _other(runs, method, count, say)]
-    return [*others, lambda say: _twin(runs, method, LONGER, say)] if _share(method) == 0.5 else others
+    return [*others, lambda say: _longer_twin(runs, method, count, say)] if _share(method) == 0.5 else others
 
 
 def _other(runs: _Runs, method: Any, count: int, say: Say) -> Beside:
@@ -331,6 +330,11 @@ def _twin(runs: _Runs, method: Integrator, share: float, say: Say) -> Beside:
     """With a share of the step, and the damping of the scene over that."""
     step = share * method.step
     return Beside(runs.run(Twin(step, lasting(runs.vibrations, step)), progress=say), share)
+
+
+def _longer_twin(runs: _Runs, method: Integrator, count: int, say: Say) -> Beside | None:
+    """With about twice the step, so many of which are a row; None where a row is one step already."""
+    return _twin(runs, method, count / -(-count // 2), say) if count > 1 else None
 
 
 def _cost(assembled: Assembled, result: Result) -> float:

@@ -35,6 +35,7 @@ from ffr_prep.common.errors import ComputationError, InputError
 
 ITERATIONS = 30
 TOLERANCE = 1e-12  # of a change of q, relative to its size or to that which strains the body by 1e-6 of its length
+ROUNDING = 1e-10  # relative as well, of a change that another one follows: what is left is rounding
 DIFFERENCE = 1e-6
 
 
@@ -203,7 +204,8 @@ def _deformed(
         step = np.linalg.solve(tangent, residual)
         q = q - step
         size = float(np.abs(step).max())
-        if size < TOLERANCE * max(float(np.abs(q).max()), 1e-6):
+        scale = max(float(np.abs(q).max()), 1e-6)
+        if size < TOLERANCE * scale or before < ROUNDING * scale:
             return q, tangent
         if size > 0.1 * before:
             tangent = None

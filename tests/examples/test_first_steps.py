@@ -76,4 +76,5 @@ def assert_swings(result):
     assert np.ptp(total) < 1e-3 * kinetic.max()
     errors = {name: of_range for name, (_, of_range) in result.attributes["errors"].items()}
     assert errors["plate.tip.position"] < 1e-3
-    assert errors["hinge.force"] < 1e-3
+    assert errors["hinge.force"] < 2e-3  # of which a vibration of 10 kHz is a part, and told
+    assert any("does not resolve carries" in note for note in result.attributes["notes"])

@@ -32,6 +32,7 @@ from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 
 STEPS = 1000  # to a period, where no method is given
+GONE = 1e-6  # of a multiplier: below it differences of a period tell nothing of the shape
 SHOWN = 12  # modes that a command prints
 CYCLES = 10  # periods that a film of one shows, at most
 
@@ -191,10 +192,11 @@ def _multipliers(of: Turns, x: Array, v: Array) -> dict[str, Any]:
     found = floquet_modes(again)
     scene, place = of.system.scene, of.system.layout
     names = in_words(scene, place, x, again.near.M, found.shapes, found.rates, [""] * found.multipliers.size)
+    told = zip(names, np.abs(found.multipliers) > GONE, strict=True)
     return {
         "multipliers": _pairs(found.multipliers),
         "exponents": _pairs(found.exponents),
-        "leading": list(names),
+        "leading": [name if lasts else "gone after a period" for name, lasts in told],
         "stable": int(np.abs(found.multipliers).max(initial=0.0) <= 1 + 1e-6),
     }
 

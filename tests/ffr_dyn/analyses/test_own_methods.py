@@ -136,7 +136,7 @@ def test_what_is_registered_is_looked_at():
 
     with pytest.raises(fd.InputError, match="method 'wrong': the class Wrong lacks order, implicit"):
         fd.register_integrator("wrong", Wrong)
-    with pytest.raises(fd.InputError, match="the method 'rk4' is there already"):
+    with pytest.raises(fd.InputError, match="there is a method 'rk4' already"):
         fd.register_integrator("rk4", fd.ROS2)
     with pytest.raises(fd.InputError, match="Wrong is no analysis"):
         fd.register_analysis(Wrong)

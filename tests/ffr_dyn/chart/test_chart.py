@@ -378,8 +378,11 @@ def test_a_cluster_is_reached_by_its_address(tmp_path):
 def test_an_address_where_nothing_answers_is_refused(monkeypatch):
     pytest.importorskip("dask.distributed")
     monkeypatch.setattr("ffr_dyn.chart.runner._CONNECT", 0.5)
-    for address in ("tcp://127.0.0.1:9", "nonsense://x"):
-        with pytest.raises(InputError, match=f"no scheduler answers at '{address}'"), pool(cluster=address):
+    for address, said in (
+        ("tcp://127.0.0.1:9", "no scheduler answers at"),
+        ("nonsense://x", "is no address of a scheduler"),
+    ):
+        with pytest.raises(InputError, match=said), pool(cluster=address):
             pass
 
 

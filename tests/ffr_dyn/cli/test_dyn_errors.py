@@ -397,7 +397,7 @@ def test_module_runs_as_a_command():
         (["info"], "plate.ffr", "plate.ffr is not a result file but, by its ending, a body file"),
         (["info"], "plate.toml", "not a result file but, by its ending, a text such as a scene, which `ffr-dyn run`"),
         (["info"], "plate.nc", "plate.nc is damaged, truncated or not a result file"),
-        (["run"], "plate.toml", "plate.toml is not a readable TOML file"),
+        (["run"], "plate.toml", "plate.toml is not text in UTF-8; save it so"),
     ],
 )
 def test_a_file_of_another_kind_is_told_by_its_ending(command, name, message, tmp_path, monkeypatch, capsys):

@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 from pydantic import ValidationError
-from test_site_reference import EXAMPLES, snippets, whole
+from test_site_reference import KINDS, snippets, whole
 
 from ffr_dyn.scene_file.read import load_scene
 from ffr_dyn.scene_file.schema import scene_entry
@@ -56,12 +56,12 @@ def complaints(tree: dict) -> set[tuple]:
     return set()
 
 
-@pytest.mark.parametrize("name", EXAMPLES)
+@pytest.mark.parametrize("name", KINDS["scene"].examples)
 def test_a_wrong_unit_is_refused_by_name(name, tmp_path, monkeypatch):
     (tmp_path / "angle.csv").write_text("0, 0\n1, 0.1\n2, 0\n", encoding="utf-8")
     monkeypatch.chdir(tmp_path)
     silent = []
-    for part in snippets(name):
+    for part in snippets("scene", name):
         tree = whole(name, part)
         for at in numbers(tree):
             if set(at) & ANY or set(at) & COUNTS:

@@ -130,7 +130,7 @@ def test_solids_are_glued_or_chosen(folder, capsys):
         (("faces", "plate4.step", "--unit", "m"), "declares that its numbers are mm"),
         (("faces", "plate4.step", "--find", "bore r=7"), "finds no face. Near are"),
         (("faces", "plate4.msh", "--glue"), "meshed already"),
-        (("faces", "plate4.step", "--page", "plate4.step"), "is an input of this command"),
+        (("faces", "plate4.step", "--page", "plate4.step"), "it is written as .html, not .step"),
         (("rigid", "plate4.step", "-o", "a.ffr"), "give the density, such as --density 7850, or a --material"),
         (("rigid", "plate4.step", "--density", "1", "--material", "steel", "-o", "a.ffr"), "give the density"),
         (("rigid", "plate4.step", "--density", "-1", "-o", "a.ffr"), "must be positive"),

@@ -469,7 +469,10 @@ def test_no_traceback_at_the_door(tmp_path):
         [sys.executable, "-m", "ffr_prep.cli", "info", "no.ffr"], capture_output=True, text=True, check=False
     )
     assert done.returncode == 2
-    assert done.stderr == "ffr-prep: body file no.ffr does not exist\n"
+    assert (
+        done.stderr
+        == "ffr-prep: body file no.ffr does not exist; make it with `ffr-prep reduce`, or name one that is there\n"
+    )
 
 
 def test_a_wrong_call_names_the_help_and_none_gets_it(capsys):

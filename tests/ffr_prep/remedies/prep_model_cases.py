@@ -19,6 +19,7 @@ from ffr_prep.body.planar import in_plane
 from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.material import Rows, parse_material
 from ffr_prep.model.model import Model
+from ffr_prep.model.reference import at_interfaces
 from ffr_prep.reduction.second_order import check_size
 from ffr_prep.reduction.selection import selection_of
 from ffr_prep.report.integrals import chosen, integral
@@ -102,12 +103,18 @@ def cut(parts: object, *interfaces: InterfaceRegion, mesh: fp.Mesh | None = None
     return reduced(*(interfaces or (LEFT, RIGHT)), mesh=mesh or long(), parts=parts, reduction=fp.Guyan())
 
 
+def placed(conditions: fp.FixedTo) -> object:
+    """Where two interfaces lie in one plane."""
+    return at_interfaces(conditions, ("one", "other"), np.zeros((2, 3)))
+
+
 PLANE = fp.CutPlane((0.5, 0, 0), (1, 0, 0))
 HALVES = p(cut, 2)
 CONDITIONS = [
     Case(p(InterfaceRegion, "a", kind="stiff"), p(InterfaceRegion, "a", kind="mean")),
     Case(p(InterfaceRegion, "a", point=(0, 0)), p(InterfaceRegion, "a", point=(0, 0, 0))),
     Case(p(held, fp.FixedTo("lift")), p(held, fp.FixedTo("left"))),
+    Case(p(placed, fp.FixedTo("plane x=0")), p(placed, fp.FixedTo("one"))),
     Case(
         p(solids, LEFT, InterfaceRegion("side", "left", "mean")),
         p(solids, LEFT, InterfaceRegion("side", "right", "mean")),

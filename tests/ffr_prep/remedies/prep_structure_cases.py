@@ -13,6 +13,7 @@ from prep_remedy import with_files
 from said import Case
 
 import ffr_prep as fp
+from ffr_prep.common.entries import assignments, with_entries
 from ffr_prep.structures.sections import with_mass_moments
 
 p = partial
@@ -40,6 +41,14 @@ SECTIONS = [
     Case(p(fp.Shell, 0.0, STEEL), p(fp.Shell, 2e-3, STEEL)),
     Case(p(fp.Shell, 2e-3, STEEL, -1.0), p(fp.Shell, 2e-3, STEEL, 0.0)),
 ]
+
+# ---- entries that are given from outside ----------------------------------------------------------------------------------
+
+ENTRIES = [
+    Case(p(assignments, ("section.d",)), p(assignments, ("section.d=0.02",))),
+    Case(p(with_entries, {"section": {"d": 0.01}}, {"section.e": "0.02"}),
+         p(with_entries, {"section": {"d": 0.01}}, {"section.d": "0.02"})),
+]  # fmt: skip
 
 # ---- frames ---------------------------------------------------------------------------------------------------------------
 
@@ -132,4 +141,4 @@ DRAWINGS = [
     Case(p(read, "Point(1) = {0, 0, 0};\n", members={"edge": MEMBER}), BARS),
     Case(p(read, "Point(1) = {0, 0, 0};\n", shells={"roof": SHEET}), SHEETS),
 ]
-CASES = SECTIONS + FRAMES + DRAWINGS
+CASES = SECTIONS + ENTRIES + FRAMES + DRAWINGS
