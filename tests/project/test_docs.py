@@ -67,6 +67,11 @@ def test_the_default_outputs_of_the_documentation_are_those_of_the_program():
     assert kept - {"*"} <= listed
 
 
+def test_the_readme_has_the_commands_that_set_everything_up():
+    lines = [line.partition("#")[0].strip() for block in code("README.md", "sh") for line in block.splitlines()]
+    assert lines[:2] == ["python3 bootstrap.py demo", "python3 bootstrap.py test"]
+
+
 def test_the_python_example_of_the_readme_runs(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "meshes").symlink_to(ROOT / "meshes")
