@@ -42,6 +42,7 @@ from ffr_prep.solids.assembly import (
     displacement_gradients,
     element_materials,
 )
+from ffr_prep.solvers.threads import ahead
 
 AVERAGING = (
     "per element a least-squares fit through the integration points, extended to the nodes; there the plain mean over "
@@ -105,12 +106,19 @@ def nodal_stress(
     total, count = np.zeros((len(nodes), 6 * fields)), np.zeros(len(nodes))
     place = np.full((owner.max(initial=0) + 1, len(mesh.points)), -1)
     place[owner, nodes] = np.arange(len(nodes))
-    for chunk in chunks(mesh, material):
+
+    def of_chunk(chunk: Chunk) -> tuple[Array, Array, Array]:
+        """The points that some elements have, the sum of what they say there, and how many say it."""
         target = place[of_element[chunk.elements, None], chunk.nodes].ravel()
         wanted = np.flatnonzero(target >= 0)
-        gather = sp.csr_array((np.ones(len(wanted)), (target[wanted], wanted)), shape=(len(nodes), len(target)))
-        total += gather @ _at_element_nodes(chunk, stress(displacement_gradients(mesh.points, chunk)))
-        count += gather.sum(axis=1)
+        points, row = np.unique(target[wanted], return_inverse=True)
+        gather = sp.csr_array((np.ones(len(wanted)), (row, wanted)), shape=(len(points), len(target)))
+        said = _at_element_nodes(chunk, stress(displacement_gradients(mesh.points, chunk)))
+        return points, gather @ said, gather.sum(axis=1)
+
+    for points, said, times in ahead(of_chunk, chunks(mesh, material)):
+        total[points] += said
+        count[points] += times
     return total.reshape(len(nodes), 6, -1) / count[:, None, None]
 
 
