@@ -20,7 +20,8 @@ def mesh_doubt(provenance: Mapping[str, Any]) -> str | None:
     first = mesh_errors_of(provenance).get(1, 0.0)
     if first < TOLD:
         return None
+    percent = f"{100 * first:.{0 if first >= 0.1 else 1}f}"
     return (
-        f"its mesh is too coarse: the lowest frequency is about {100 * first:.2g} % too high; reduce it with smaller "
+        f"its mesh is too coarse: the lowest frequency is about {percent} % too high; reduce it with smaller "
         "elements or with those of second order (`ffr-prep reduce --size`, `--order 2`)"
     )
