@@ -8,6 +8,8 @@ import pytest
 import scipy.linalg  # noqa: F401 - a library must be loaded before it can be limited
 from threadpoolctl import threadpool_limits
 
+from ffr_prep.common.registry import plugins
+
 # Tests borrow scenes and bodies from each other across the folders.
 sys.path += sorted(str(folder) for folder in Path(__file__).parent.rglob("[!_.]*") if folder.is_dir())
 
@@ -30,3 +32,12 @@ def broken_pipes_raise():
     """gmsh, where a test calls it in this process, lets a write to a dead child kill the process; undo that."""
     yield
     signal.signal(signal.SIGPIPE, signal.SIG_IGN)
+
+
+@pytest.fixture(autouse=True)
+def plugins_are_gone():
+    """Code of a user that a test has loaded, often from a folder that ends with it: workers would load it, too."""
+    before = set(plugins())
+    yield
+    for path in set(plugins()) - before:
+        del sys.modules[f"ffr_plugin:{path}"]

@@ -104,7 +104,7 @@ def crew(count: int) -> Iterator[Crew]:
 
 
 def _asked(worker: Worker, task: tuple[Callable[[Any], Any], Any]) -> Any:
-    """The answer of a worker. Raises EOFError or OSError where it is dead."""
+    """The answer of a worker, an InputError where it can do no task. Raises EOFError or OSError where it is dead."""
     pickle.dump(task, _pipe(worker.stdin))
     _pipe(worker.stdin).flush()
     return pickle.load(_pipe(worker.stdout))
@@ -118,14 +118,25 @@ def _pipe(stream: Any) -> BinaryIO:
 # ---- in the worker --------------------------------------------------------------------------------------------------
 
 
-def _serve(tasks: BinaryIO, answers: BinaryIO) -> None:
+def _serve(tasks: BinaryIO, answers: BinaryIO, files: Sequence[str]) -> None:
+    refused = _refused(files)
     waiting: queue.SimpleQueue[Any] = queue.SimpleQueue()
     threading.Thread(target=_read, args=(tasks, waiting), daemon=True).start()
     with suppress(KeyboardInterrupt, BrokenPipeError), alone():  # who asked may be gone
         while (task := waiting.get()) is not None:
             function, item = task
-            pickle.dump(tried(function, item), answers)
+            pickle.dump(refused or tried(function, item), answers)
             answers.flush()
+
+
+def _refused(files: Sequence[str]) -> InputError | None:
+    """Why a file that was loaded where the study runs cannot be loaded here; None where all can."""
+    try:
+        for file in files:
+            load_plugin(file)
+    except InputError as error:
+        return InputError(f"a worker of the study cannot load what was loaded when it began. {error}")
+    return None
 
 
 def _read(tasks: BinaryIO, waiting: queue.SimpleQueue[Any]) -> None:
@@ -143,7 +154,5 @@ def _read(tasks: BinaryIO, waiting: queue.SimpleQueue[Any]) -> None:
 if __name__ == "__main__":
     replies = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # what libraries print does not come between
-    for file in sys.argv[1:]:
-        load_plugin(file)
-    _serve(sys.stdin.buffer, replies)
+    _serve(sys.stdin.buffer, replies, sys.argv[1:])
     os._exit(0)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-import sys
 
 import numpy as np
 import pytest
@@ -44,15 +43,12 @@ j = "rod.hinge"
 
 @pytest.fixture(autouse=True)
 def as_it_was():
-    """What a test registers is gone after it, and so are the modules that did."""
-    methods, analyses, modules = dict(METHODS), dict(registry._REGISTERED), set(sys.modules)
+    """What a test registers is gone after it."""
+    methods, analyses = dict(METHODS), dict(registry._REGISTERED)
     yield
     for now, before in ((METHODS, methods), (registry._REGISTERED, analyses)):
         now.clear()
         now.update(before)
-    for name in set(sys.modules) - modules:
-        if name.startswith("ffr_plugin:"):
-            del sys.modules[name]
 
 
 @pytest.fixture

@@ -14,6 +14,7 @@ from places import ROOT
 
 from ffr_dyn.chart.runner import Failure
 from ffr_dyn.studies.workers import crew
+from ffr_prep.common.errors import InputError
 from ffr_prep.common.registry import load_plugin
 
 
@@ -86,7 +87,15 @@ def test_workers_load_the_plugins(tmp_path):
         with crew(1) as workers:
             assert list(workers.results(eval, ["own_number"])) == [(0, 42)]
     finally:
-        sys.modules.pop(f"ffr_plugin:{plugin.resolve()}")
         import builtins
 
         del builtins.own_number
+
+
+def test_a_plugin_that_is_gone_is_named(tmp_path):
+    plugin = tmp_path / "own.py"
+    plugin.write_text("")
+    load_plugin(plugin)
+    plugin.unlink()
+    with crew(1) as workers, pytest.raises(InputError, match=r"a worker .* cannot load .*own\.py: give a file"):
+        list(workers.results(abs, [-1]))
