@@ -120,9 +120,11 @@ def require_driven(scene: Scene, time: float, analysis: str) -> None:
             f"over-driven: {', '.join(map(repr, over))} prescribe a motion that the joints and other drivers already fix; "
             "remove a driver"
         )
-    free = mobility(scene, time=time).free
-    if free:
-        said = "; ".join(f"{motion.name} (moves {', '.join(motion.bodies)})" for motion in free)
+    found = mobility(scene, time=time)
+    if (
+        found.degrees_of_freedom > found.elastic
+    ):  # at a singular position there are more free motions than the mechanism has
+        said = "; ".join(f"{motion.name} (moves {', '.join(motion.bodies)})" for motion in found.free)
         raise InputError(f"{analysis} needs every rigid motion prescribed by a driver; free: {said}")
 
 
