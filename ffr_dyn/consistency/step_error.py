@@ -1,4 +1,4 @@
-"""What the length of the steps costs every output of a run: compared with runs of other steps, and with a twin.
+"""The error that the length of the steps makes in every output of a run: compared with runs of other steps, and with a twin.
 
 Two runs that damp a vibration which neither resolves agree on the wrong curve, so that their difference tells nothing. Hence
 the twin (`ffr_dyn.integrators.ros2.Twin`), which keeps its amplitude: with R of the run, at steps h and r h, order p,

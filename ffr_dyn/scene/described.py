@@ -1,4 +1,4 @@
-"""What every result says of its scene: title, parts, and what connects which points, so that it can be drawn."""
+"""The description of the scene in every result: title, parts, and which points connections join, so that it can be drawn."""
 
 from __future__ import annotations
 
