@@ -20,6 +20,7 @@ from ffr_prep.common.reading import check_ordinary, read_text
 # 1.5, 1.5E3, 1.5D3, 1.5+3; and 15, which a real field may hold as well
 _REAL = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+))(?:[EeDd]?([+-]\d+)|[EeDd](\d+))?")
 _BEGIN = re.compile(r"^\s*BEGIN\s*(?:BULK)?\b.*$", re.MULTILINE | re.IGNORECASE)
+_PARAMETER = re.compile(r"\s*PARAM\s*,", re.IGNORECASE)
 _INCLUDE = re.compile(r"\s*INCLUDE\s+'?\"?([^'\"]+)", re.IGNORECASE)
 
 
@@ -60,7 +61,7 @@ class Card:
 
 
 def cards(path: Path, above: tuple[Path, ...] = ()) -> Iterator[Card]:
-    """The cards of a file, through the files that it includes; control before the bulk data is passed over.
+    """The cards of a file, through the files that it includes; of the control before the bulk data the parameters alone.
 
     Raises InputError for a file that cannot be read, includes itself, or begins with a continuation.
     """
@@ -70,7 +71,12 @@ def cards(path: Path, above: tuple[Path, ...] = ()) -> Iterator[Card]:
     card: Card | None = None
     waiting: dict[str, Card] = {}  # by the marks with which they end
     early: dict[str, Card] = {}  # what goes on with a card that is not there yet, by the marks with which it begins
-    for number, line in enumerate(text.splitlines()[first:], start=first + 1):
+    lines = text.splitlines()
+    for number, line in enumerate(lines[:first], start=1):
+        if _PARAMETER.match(line):
+            name, fields, _ = _fields(line.partition("$")[0].strip(), f"{path}: line {number}")
+            yield Card(name.upper(), fields, number)
+    for number, line in enumerate(lines[first:], start=first + 1):
         plain = line.partition("$")[0].rstrip().expandtabs(8)
         if not plain:
             continue

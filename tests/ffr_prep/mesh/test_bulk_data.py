@@ -339,11 +339,11 @@ def test_what_of_a_material_is_not_taken_is_told_with_its_name(tmp_path, elastic
     assert plain.name == "Stahl"
 
 
-def test_densities_that_are_weights(tmp_path):
-    """PARAM,WTMASS makes mass of them: pounds and inches, with g = 386.09 in/s^2."""
-    text = deck(box("tet4"), "tet4", free).replace(
-        "ENDDATA", "PSOLID,7,3\nMAT1,3,2.1+11,,.3,77008.5\nPARAM,WTMASS,.101936\nENDDATA", 1
-    )
+@pytest.mark.parametrize("before", ["ENDDATA", "BEGIN BULK"])
+def test_densities_that_are_weights(tmp_path, before):
+    """PARAM,WTMASS makes mass of them, here of N/m^3, wherever it stands."""
+    text = deck(box("tet4"), "tet4", free).replace("ENDDATA", "PSOLID,7,3\nMAT1,3,2.1+11,,.3,77008.5\nENDDATA", 1)
+    text = text.replace(before, f"param,wtmass,.101936 $ 1/g\n{before}", 1)
     (tmp_path / "a.bdf").write_text(text)
     (material,) = fp.file_materials(tmp_path / "a.bdf", fp.read_mesh(tmp_path / "a.bdf")).values()
     assert material.rho == pytest.approx(77008.5 * 0.101936)
