@@ -2,7 +2,7 @@
 
 A card is a name and its fields; a field is a text, "" where it is blank. Small fields are ten of eight columns, large ones (a
 name with *) six of which four have sixteen, free ones stand between commas. A line whose first field is blank, or begins with
-+ or *, goes on with a card: with that one whose last line ends with the same mark, wherever it stands, else with the one above.
++ or *, goes on with a card: with that one whose last line ends with the same mark, wherever it stands, else with the last.
 
 Source: MSC Nastran Quick Reference Guide, section 5 (format of bulk data entries).
 """
@@ -107,7 +107,9 @@ def cards(path: Path, above: tuple[Path, ...] = ()) -> Iterator[Card]:
     yield from _put_away(card, waiting)
     yield from waiting.values()
     for left in early.values():
-        raise InputError(f"{path}: line {left.line} goes on with a card that ends with the mark {left.name}, but none does")
+        raise InputError(
+            f"{path}: line {left.line} goes on with a card that ends with the mark {left.name}, but none does"
+        )
 
 
 def _with_early(card: Card, early: dict[str, Card]) -> Card:
@@ -154,7 +156,9 @@ def _fields(line: str, where: str) -> tuple[str, list[str], str]:
         name, *fields = (text.strip() for text in line.split(","))
         count = 4 if name.endswith("*") or name.startswith("*") else 8
         if any(fields[count + 1 :]) or (len(fields) > count and fields[count][:1] not in ("", "+", "*")):
-            raise InputError(f"{where} has {len(fields)} fields behind the name; {count} is the most, then go on in the next line")
+            raise InputError(
+                f"{where} has {len(fields)} fields behind the name; {count} is the most, then go on in the next line"
+            )
         return name, _padded(fields[:count], count), _mark("".join(fields[count:]))
     name = line[:8].strip()
     width, count = (16, 4) if name.endswith("*") or name.startswith("*") else (8, 8)

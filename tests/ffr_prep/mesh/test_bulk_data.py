@@ -323,8 +323,8 @@ def test_orthotropic_materials_and_those_that_are_not_read(tmp_path):
         ("\n2.1e11, .3, 20.\n1.9e11, .3, 300.", "", "Stahl at 20., the first of 2 temperatures"),
         ("\n2.1e11, .3", "*PLASTIC\n2e8, 0.\n*DAMPING, ALPHA=1.", "Stahl, without its *PLASTIC, without its *DAMPING"),
         (
-            ", TYPE=ENGINEERING CONSTANTS\n1e10, 8e8, 5e8, .4, .3, .3, 7e8, 7e8\n8e7, 20.\n9e9, 8e8, 5e8, .4, .3, .3, 7e8, 7e8"
-            "\n8e7, 90.",
+            ", TYPE=ENGINEERING CONSTANTS\n1e10, 8e8, 5e8, .4, .3, .3, 7e8, 7e8\n8e7, 20."
+            "\n9e9, 8e8, 5e8, .4, .3, .3, 7e8, 7e8\n8e7, 90.",
             "",
             "Stahl at 20., the first of 2 temperatures",
         ),
