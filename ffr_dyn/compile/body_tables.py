@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass
+from itertools import accumulate
 
 import numpy as np
 
@@ -49,12 +50,12 @@ def _PP_parts(integrals: Integrals, normal: int) -> Array:
 
 
 def _pool(parts: list[Array]) -> Array:
-    return np.concatenate([np.ravel(p) for p in parts]) if parts else np.zeros(0)
+    return np.concatenate([part.ravel() for part in parts]) if parts else np.zeros(0)
 
 
 def starts(sizes: Sequence[int] | Array) -> Array:
     """Where parts of these sizes begin one after another, and the end."""
-    return np.concatenate([[0], np.cumsum(sizes, dtype=np.int64)]).astype(np.int64)
+    return np.array(list(accumulate(sizes, initial=0)), dtype=np.int64)
 
 
 def once(parts: Sequence[Array], owners: Sequence[Hashable]) -> tuple[Array, Array]:

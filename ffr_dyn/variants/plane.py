@@ -9,6 +9,7 @@ and a revolute joint two rows. What a mesh leaves of symmetry and places counts 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import fields, replace
 from functools import partial
@@ -37,6 +38,7 @@ _MIXED = 1e-12  # of a mode of norm one
 # What the search for a plane understands; a scene with anything else is planar only when it is declared so.
 _KNOWN = {"bodies", "joints", "drivers", "couplings", "loads", "springs", "forces", "ground"}
 _KNOWN |= {"gravity", "base_acceleration", "measurements", "name", "plane"}
+_OTHERS = [field.name for field in fields(Scene) if field.name not in _KNOWN]
 
 
 def planar_forms(scene: Scene) -> Iterator[Scene]:
@@ -137,7 +139,7 @@ def _ratios(body: Body) -> bytes:
 
 def _across(scene: Scene, normal: int) -> Iterator[str]:
     """What makes a planar motion impossible, in words."""
-    if abs(scene.gravity[normal]) > _NOTHING * np.linalg.norm(scene.gravity):
+    if _has_part(scene.gravity, normal):
         yield f"gravity has the component {scene.gravity[normal]:g} m/s^2 along it"
     if not is_zero(scene.base_acceleration[normal]):
         yield "base_acceleration has a component along it"
@@ -145,7 +147,7 @@ def _across(scene: Scene, normal: int) -> Iterator[str]:
         k = body_normal(body, normal)
         if k < 0:
             yield f"no axis of body {body.name!r} is along it"
-        elif body.velocity.any() and abs(body.velocity[normal]) > _NOTHING * np.linalg.norm(body.velocity):
+        elif _has_part(body.velocity, normal):
             yield f"body {body.name!r} starts with a velocity along it"
         elif not body.omega_bar.any():
             continue
@@ -156,6 +158,12 @@ def _across(scene: Scene, normal: int) -> Iterator[str]:
             yield f"driver {driver.name!r} prescribes a motion along it"
 
 
+def _has_part(vector: Array, k: int) -> bool:
+    """Whether a component of a vector is more than nothing."""
+    numbers: list[float] = vector.tolist()
+    return abs(numbers[k]) > _NOTHING * math.hypot(*numbers)
+
+
 def _obstacles(scene: Scene, normal: int) -> Iterator[str]:
     """What makes a planar motion impossible, may take it out of the plane, or makes reactions that it does not have."""
     yield from _across(scene, normal)
@@ -164,7 +172,7 @@ def _obstacles(scene: Scene, normal: int) -> Iterator[str]:
 
 def _leaving(scene: Scene, normal: int) -> Iterator[str]:
     """What may take the motion out of the plane, or makes reactions that a planar scene does not have."""
-    if any(f.name not in _KNOWN and getattr(scene, f.name) for f in fields(scene)):
+    if any(getattr(scene, name) for name in _OTHERS):
         yield "there are forces of other kinds"
     for body in scene.bodies:
         k = body_normal(body, normal)
