@@ -90,7 +90,8 @@ def moments(body: FlexibleBody | Integrals, q: Array) -> Moments:
 
 def inertia_tensor(moment: Moments) -> Array:
     """(3, 3) J of the deformed body about the origin of its frame. Equation (11) of docs/notation.md."""
-    return np.trace(moment.W) * np.eye(3) - moment.W
+    W = moment.W
+    return (W[0, 0] + W[1, 1] + W[2, 2]) * np.eye(3) - W
 
 
 def mass_matrix(body: FlexibleBody | Integrals, q: Array) -> Array:

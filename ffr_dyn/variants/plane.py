@@ -131,7 +131,7 @@ def _form_in_plane(
 
 def _ratios(body: Body) -> bytes:
     """What of the damping of a body tells double modes apart: nothing where all ratios are one."""
-    return body.damping.tobytes() if np.ptp(body.damping) else b""
+    return body.damping.tobytes() if len(set(body.damping.tolist())) > 1 else b""
 
 
 # ---- what stands in the way ---------------------------------------------------------------------------------------
