@@ -74,6 +74,13 @@ def initial_state(scene: Scene, place: Layout) -> tuple[Array, Array]:
     return x, v
 
 
+def angular_speeds(place: Layout, v: Array) -> Array:
+    """(T, B) [rad/s] of all bodies, from velocities (T, V)."""
+    omega = v[:, np.add.outer(np.array(place.iv, dtype=int) + 3, np.arange(3))]
+    speeds: Array = np.sqrt((omega * omega).sum(axis=2))
+    return speeds
+
+
 def moved(place: Layout, x: Array, step: Array) -> Array:
     """x moved by a small motion (V,) in body axes; rotations are exact."""
     out = x.copy()
