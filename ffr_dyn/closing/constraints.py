@@ -146,7 +146,9 @@ def _jacobian(constraints: Constraints) -> Matrix:
 def entries_of(model: Model, place: Layout) -> Entries:
     """Of the rows of a scene; those of the last structures are known by the integers that make them."""
     m = model.markers
-    return _entries(model.rows.marker.shape[1], *map(_listed, (model.rows.marker, model.rows.start, m.body, m.start)), place)
+    return _entries(
+        model.rows.marker.shape[1], *map(_listed, (model.rows.marker, model.rows.start, m.body, m.start)), place
+    )
 
 
 def _listed(table: Array) -> tuple[int, ...]:
@@ -155,7 +157,12 @@ def _listed(table: Array) -> tuple[int, ...]:
 
 @lru_cache(64)
 def _entries(
-    sides: int, markers: tuple[int, ...], start: tuple[int, ...], body: tuple[int, ...], phi: tuple[int, ...], place: Layout
+    sides: int,
+    markers: tuple[int, ...],
+    start: tuple[int, ...],
+    body: tuple[int, ...],
+    phi: tuple[int, ...],
+    place: Layout,
 ) -> Entries:
     """Markers on all sides of the blocks, where the rows of each begin, and of all markers body and beginning in `phi`."""
     row, side, lane, first = list[int](), list[int](), list[int](), list[int]()

@@ -13,7 +13,7 @@ from typing import Any, Generic, TypeVar
 
 import numpy as np
 
-from ffr_dyn.kernels.simd.table_address import pack, places_of_addresses
+from ffr_dyn.kernels.simd.table_address import address_of, pack, places_of_addresses
 from ffr_prep.common.arrays import Array
 
 T = TypeVar("T", bound=tuple[Any, ...])
@@ -51,7 +51,7 @@ def in_one_piece(tables: T, but: str = "") -> Piece[T]:
     but : a field that is an empty tuple, of which the words are left open
     """
     made, numbers, forms, order = _laid_out(tables)
-    address = numbers.ctypes.data
+    address = address_of(numbers)
     words = pack(made, [address + forms[k][2] for k in order], but)
     return Piece(made, words, numbers, forms, order, places_of_addresses(type(made), but))
 
@@ -60,7 +60,7 @@ def copied(piece: Piece[T]) -> tuple[T, Array]:
     """The tables in memory of their own, and their words."""
     numbers, words = _room(piece.numbers.size), piece.words.copy()
     numbers[:] = piece.numbers
-    words[piece.places] += numbers.ctypes.data - piece.numbers.ctypes.data
+    words[piece.places] += address_of(numbers) - address_of(piece.numbers)
     return _replaced(piece.tables, _views(numbers, piece.forms), iter(piece.order)), words
 
 
@@ -80,7 +80,7 @@ def _laid_out(tables: T) -> tuple[T, Array, list[Form], list[int]]:
 def _room(size: int) -> Array:
     """(size,) numbers from the start of a cache line."""
     memory = np.zeros(size + LINE, dtype=np.int64)
-    at = -memory.ctypes.data // 8 % LINE
+    at = -address_of(memory) // 8 % LINE
     return memory[at : at + size]
 
 

@@ -30,12 +30,14 @@ from ffr_dyn.variants.families import ROUNDING, SECOND_ORDER_ROUNDING
 from ffr_prep.body import axial, remembered
 from ffr_prep.common.arrays import Array
 
-SYMMETRIC = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+SYMMETRIC = [0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]
 
 
 def _six(tensor: Array) -> Array:
     """(3, 3, ...) -> (6, ...) symmetric part."""
-    return np.stack([0.5 * (tensor[k, l] + tensor[l, k]) for k, l in SYMMETRIC])  # noqa: E741
+    rows, columns = SYMMETRIC
+    found: Array = 0.5 * (tensor[rows, columns] + tensor[columns, rows])
+    return found
 
 
 def _nine(tensor: Array) -> Array:

@@ -14,7 +14,7 @@ from ffr_dyn.compile.stiff_rows import with_stiff_rows
 from ffr_dyn.compile.workspace import new_tables
 from ffr_dyn.kernels.entry_points import evaluate_exact, evaluate_loads, record_state, run, run_controlled, step
 from ffr_dyn.kernels.simd.force_kernel import kernel_of
-from ffr_dyn.kernels.simd.table_address import pack, place_of
+from ffr_dyn.kernels.simd.table_address import address_of, pack, place_of
 from ffr_dyn.kernels.tables import NOT_FINITE, OK, PER_ROW, SPACING, Control, Model, Record, Tables, Work
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.brief import Brief
@@ -103,7 +103,7 @@ def _engine(system: System, tables: Tables, words: Array) -> Engine:
     """With the words of the system's model in those of the tables."""
     at = place_of(Tables, "model")
     words[at : at + system.words.size] = system.words
-    words[0] = words.ctypes.data
+    words[0] = address_of(words)
     return Engine(system, tables._replace(address=int(words[0])), words)
 
 
@@ -143,7 +143,7 @@ def row_filler(engine: Engine, record: Record) -> Callable[[float], int]:
     """`fill_rows` for one record, again and again at the least cost: of the time of step number 0, a status."""
     entry = run_controlled if engine.tables.control.numbers.size else run
     call, words = entry.general.c_function, pack(record)
-    address, place = engine.address, words.ctypes.data
+    address, place = engine.address, address_of(words)
 
     def fill(start: float, kept: Array = words) -> int:  # the numbers at `place` live as long as this function
         return call(address, start, place)

@@ -81,7 +81,11 @@ def new_tables(system: System, method: Integrator | None, keeps_passed: bool) ->
 
 def _blank(system: System, needs: _Needs) -> Tables:
     place = system.layout
-    X, V, x_chosen, v_chosen = place.x_size, place.v_size, *(size * needs.controlled for size in (place.x_size, place.v_size))
+    X, V, x_chosen, v_chosen = (
+        place.x_size,
+        place.v_size,
+        *(size * needs.controlled for size in (place.x_size, place.v_size)),
+    )
     return Tables(
         address=0,
         entry_points=np.zeros(len(system.chosen), dtype=np.int64),

@@ -197,7 +197,8 @@ class Scene(Brief):
         pairs: tuple[Any, ...] = (*self.joints, *(driver for driver in self.drivers if isinstance(driver, PointDriver)))
         at = {*loaded_markers(self), *(end for pair in pairs for end in (pair.i, pair.j))}
         return {
-            body.name: tuple(i.name for i in body.model.interfaces if f"{owner(body)}.{i.name}" in at) for body in self.bodies
+            body.name: tuple(i.name for i in body.model.interfaces if f"{owner(body)}.{i.name}" in at)
+            for body in self.bodies
         }
 
     def __post_init__(self) -> None:

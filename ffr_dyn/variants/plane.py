@@ -20,6 +20,7 @@ import numpy as np
 from ffr_dyn.functions.time_functions import is_zero
 from ffr_dyn.scene.drivers import PointDriver
 from ffr_dyn.scene.force_kinds import forces_of, in_bases
+from ffr_dyn.scene.forces.places import OnJoint
 from ffr_dyn.scene.own_frame import OwnFrame
 from ffr_dyn.scene.scene import Body, Scene, altered, body_normal, marker_number, undeformed, used_interfaces
 from ffr_dyn.variants.aligned import BESIDE, basis_in_plane, combined, levelled, size_of
@@ -154,8 +155,11 @@ def _across(scene: Scene, normal: int) -> Iterator[str]:
         elif np.abs(np.delete(body.omega_bar, k)).max() > _NOTHING * np.linalg.norm(body.omega_bar):
             yield f"body {body.name!r} starts with an angular velocity across it"
     for driver in scene.drivers:
-        if isinstance(driver, PointDriver) and (driver.x, driver.y, driver.z)[normal] is not None:
-            yield f"driver {driver.name!r} prescribes a motion along it"
+        if isinstance(driver, PointDriver):
+            if (driver.x, driver.y, driver.z)[normal] is not None:
+                yield f"driver {driver.name!r} prescribes a motion along it"
+        elif not OnJoint(driver.name, driver.joint, driver.coordinate).stays_in_plane(scene, normal):
+            yield f"driver {driver.name!r} prescribes a motion across it"
 
 
 def _has_part(vector: Array, k: int) -> bool:

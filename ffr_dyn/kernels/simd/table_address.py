@@ -7,6 +7,7 @@ of that and reads a field where it uses it. What a table holds, and in which ord
 
 from __future__ import annotations
 
+import ctypes
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -100,10 +101,18 @@ def _gather(tables: Any, arrays: list[Array], integers: list[int], numbers: list
             integers.append(value)
 
 
+def address_of(array: Array) -> int:
+    """Of its first number. `array.ctypes` takes ten times as long, and is needed where there is none, or it is read only."""
+    try:
+        return ctypes.addressof(ctypes.c_char.from_buffer(array))
+    except (TypeError, ValueError):
+        return array.ctypes.data
+
+
 def pack(tables: Any, addresses: Sequence[int] = (), but: str = "") -> Array:
     """Addresses and shapes of the arrays of nested named tuples, and their numbers (int64). The arrays must outlive it.
 
-    addresses : of all arrays, where they are known; numpy takes long to tell them
+    addresses : of all arrays, where they are known
     but       : a field that is an empty tuple, of which the words are left open
     """
     kind: Any = type(tables)
@@ -114,7 +123,7 @@ def pack(tables: Any, addresses: Sequence[int] = (), but: str = "") -> Array:
     if not all(of.flags.c_contiguous for of in arrays):
         raise TypeError(f"{kind.__name__} holds an array that is not contiguous")
     words = np.zeros(plan.words, dtype=np.int64)
-    words[plan.addresses] = addresses or [of.ctypes.data for of in arrays]
+    words[plan.addresses] = addresses or [address_of(of) for of in arrays]
     words[plan.shapes] = [size for of in arrays for size in of.shape]
     words[plan.integers], words[plan.numbers] = integers, np.array(numbers, dtype=float).view(np.int64)
     return words
