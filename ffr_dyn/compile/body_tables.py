@@ -141,7 +141,7 @@ def body_tables(scene: Scene, place: Layout) -> Bodies:
     """Tables of all bodies."""
     of = [_tables(body, normal) for body, normal in zip(scene.bodies, place.normals, strict=True)]
     owners = [_owner(body) for body in scene.bodies]
-    in_plane = [(*owner, k) for owner, k in zip(owners, place.normals, strict=True)]
+    in_plane = [(*owner, k) * (n > 0) for owner, k, n in zip(owners, place.normals, place.n, strict=True)]
     PP = tables_in_blocks(in_plane, lambda b: of[b].PP_dm)
     omega2, column = once([i.omega2 for i in of], owners)
     bounds, beside = zip(*(_damping(body) for body in scene.bodies), strict=True)
@@ -175,6 +175,8 @@ def _damping(body: Body) -> tuple[Array, Array]:
     much; empty where the matrix is diagonal."""
     if not body.model.n:
         return body.damping, body.damping
+    if body.model.damping is None:
+        return 2 * body.damping * np.sqrt(body.model.omega2), np.zeros(0)
     D = damping_matrix(body.model, body.damping)
     diagonal = np.diag(D)
     rest = D - np.diag(diagonal)

@@ -38,7 +38,7 @@ def marker_tables(scene: Scene, place: Layout, blocks: tuple[Block, ...]) -> Mar
         return _bending(scene.bodies[b], point, rows[k]) if bends[k] else NO_BLOCKS
 
     body = [scene.bodies[b].model if b < ground else None for b, _, _ in table]
-    bending = tables_in_blocks([(id(body[k]), table[k][2], rows[k], bends[k]) for k in range(len(table))], make)
+    bending = tables_in_blocks([(id(body[k]), table[k][2], rows[k]) * bends[k] for k in range(len(table))], make)
     counts = [len(row) for row in rows]
     turns = [int(k in turning) for k in range(len(table))]
     return Markers(

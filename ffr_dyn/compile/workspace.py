@@ -134,7 +134,8 @@ def _fill(work: Work, m: Model) -> None:
     for b in np.flatnonzero(m.bodies.where[:-1, N] == 0).tolist():
         numbers = m.bodies.moments[b].tobytes(), float(m.bodies.mass[b])
         bodies.s[b], bodies.J[b], bodies.L[b] = _rigid_inertia(*numbers, int(m.bodies.where[b, NORMAL]))
-        bodies.inverse[b, 1] = _inverse(np.trace(bodies.J[b]))
+        xx, yy, zz = bodies.J[b].diagonal().tolist()
+        bodies.inverse[b, 1] = _inverse(xx + yy + zz)
 
 
 def _blank_work(m: Model, keeps_terms: bool, keeps_passed: bool) -> Work:

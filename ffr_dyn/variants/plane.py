@@ -20,7 +20,7 @@ import numpy as np
 from ffr_dyn.functions.time_functions import is_zero
 from ffr_dyn.scene.drivers import PointDriver
 from ffr_dyn.scene.force_kinds import forces_of, in_bases
-from ffr_dyn.scene.forces.places import OnJoint
+from ffr_dyn.scene.forces.places import LEVEL, OnJoint
 from ffr_dyn.scene.own_frame import OwnFrame
 from ffr_dyn.scene.scene import Body, Scene, altered, body_normal, marker_number, undeformed, used_interfaces
 from ffr_dyn.variants.aligned import BESIDE, basis_in_plane, combined, levelled, size_of
@@ -187,7 +187,7 @@ def _leaving(scene: Scene, normal: int) -> Iterator[str]:
             yield f"force {force.name!r} may act across"
     for joint in scene.joints:
         i, j = (undeformed(scene, marker_number(scene, name))[normal] for name in (joint.i, joint.j))
-        if round(abs(i - j), 9) > 0:
+        if abs(i - j) > LEVEL:
             yield f"joint {joint.name!r} runs aslant: its points are {abs(i - j):.3g} m apart along the normal"
 
 
