@@ -46,7 +46,7 @@ Forces are written as
 @parameter_option
 @time_option
 def check(scene: Path, parameters: tuple[str, ...], time: float | None) -> None:
-    """What SCENE can do: degrees of freedom, free motions, redundant rows of joints, drivers that contradict."""
+    """Mobility of SCENE: degrees of freedom, free motions, redundant rows of joints, drivers that contradict."""
     from ffr_dyn.analyses.static import Static
     from ffr_dyn.consistency.mobility import mobility
     from ffr_dyn.scene_file.read import load_scene

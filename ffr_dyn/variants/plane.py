@@ -131,7 +131,7 @@ def _form_in_plane(
 
 
 def _ratios(body: Body) -> bytes:
-    """What of the damping of a body tells double modes apart: nothing where all ratios are one."""
+    """The part of the damping of a body that tells double modes apart: empty where all ratios are one."""
     return body.damping.tobytes() if len(set(body.damping.tolist())) > 1 else b""
 
 
@@ -139,7 +139,7 @@ def _ratios(body: Body) -> bytes:
 
 
 def _across(scene: Scene, normal: int) -> Iterator[str]:
-    """What makes a planar motion impossible, in words."""
+    """The reasons why a planar motion is impossible, in words."""
     if _has_part(scene.gravity, normal):
         yield f"gravity has the component {scene.gravity[normal]:g} m/s^2 along it"
     if not is_zero(scene.base_acceleration[normal]):
@@ -169,13 +169,13 @@ def _has_part(vector: Array, k: int) -> bool:
 
 
 def _obstacles(scene: Scene, normal: int) -> Iterator[str]:
-    """What makes a planar motion impossible, may take it out of the plane, or makes reactions that it does not have."""
+    """The reasons why a planar motion is impossible, may leave the plane, or has reactions across it."""
     yield from _across(scene, normal)
     yield from _leaving(scene, normal)
 
 
 def _leaving(scene: Scene, normal: int) -> Iterator[str]:
-    """What may take the motion out of the plane, or makes reactions that a planar scene does not have."""
+    """The loads that may take the motion out of the plane, or make reactions that a planar scene does not have."""
     if any(getattr(scene, name) for name in _OTHERS):
         yield "there are forces of other kinds"
     for body in scene.bodies:
@@ -195,7 +195,7 @@ def _leaving(scene: Scene, normal: int) -> Iterator[str]:
 
 
 def _asymmetry(part: Body, k: int, used: tuple[str, ...]) -> str:
-    """What of in-plane motion excites something across body axis k, rigid or elastic, in words; "" of a symmetric body."""
+    """The in-plane motion that excites something across body axis k, rigid or elastic, in words; "" of a symmetric body."""
     key = "asymmetry", k, used, part.stiffening, _ratios(part) if part.model.n else b""
     return remembered(part.model, key, lambda: _found_asymmetry(part, k, used))
 

@@ -104,7 +104,7 @@ def _gather(tables: Any, arrays: list[Array], integers: list[int], numbers: list
 def address_of(array: Array) -> int:
     """Of its first number. `array.ctypes` takes ten times as long, and is needed where there is none, or it is read only."""
     try:
-        return ctypes.addressof(ctypes.c_char.from_buffer(array))
+        return ctypes.addressof(ctypes.c_char.from_buffer(array))  # type: ignore[arg-type]
     except (TypeError, ValueError):
         return array.ctypes.data
 
@@ -201,7 +201,7 @@ def _view(table: type) -> Any:
 
 @intrinsic
 def _address_of(typing, table):  # type: ignore[no-untyped-def]
-    """What `_view` was given."""
+    """The table that `_view` was given."""
 
     def generate(context, builder, signature, args):  # type: ignore[no-untyped-def]
         return builder.ptrtoint(args[0], context.get_value_type(types.int64))
