@@ -77,6 +77,28 @@ def turned_link() -> Scene:
     return Scene((Body("link", LINK),), (hinge,), ground={"O": (0, 0, 0)}, gravity=(0, 0, -9.81))
 
 
+def four_bar(angle: float) -> Scene:
+    """A parallelogram of rigid bars, singular where it is flat (angle 0) and regular elsewhere."""
+    bars = {name: rigid_body(name, mass=1.0, inertia=(0.1,) * 3, centre_of_mass=(0.5 * length, 0, 0),
+                             points={"a": (0, 0, 0), "b": (length, 0, 0)})
+            for name, length in (("left", 1.0), ("top", 2.0), ("right", 1.0))}  # fmt: skip
+    end = np.array([np.cos(angle), np.sin(angle), 0.0])
+    places = {"left": (0, 0, 0), "top": end, "right": (2, 0, 0)}
+    turns = {"left": angle, "top": 0.0, "right": angle}
+    ties = {
+        "one": ("ground.O", "left.a"),
+        "two": ("left.b", "top.a"),
+        "three": ("top.b", "right.b"),
+        "four": ("ground.P", "right.a"),
+    }
+    return Scene(
+        tuple(Body(name, bar, position=places[name], rotation=(0, 0, turns[name])) for name, bar in bars.items()),
+        tuple(fd.Joint(name, "revolute", *ends) for name, ends in ties.items()),
+        ground={"O": (0, 0, 0), "P": (2, 0, 0)},
+        gravity=(0, -9.81, 0),
+    )
+
+
 def softer(link: FlexibleBody) -> FlexibleBody:
     """The link with one number changed."""
     return replace(link, omega2=link.omega2 * np.append(0.9, np.ones(link.n - 1)))
@@ -106,6 +128,8 @@ SCENES = {
                                 slider_crank().joints[3]),
     ),
     "across y": turned_link,
+    "four-bar": lambda: four_bar(0.5),
+    "four-bar, flat": lambda: four_bar(0.0),
 }  # fmt: skip
 
 
