@@ -116,7 +116,7 @@ def rows_at(constraints: Constraints, x: Array, v: Array) -> RowsAt:
 
 
 def open_at(constraints: Constraints, x: Array, v: Array) -> tuple[Array, Array]:
-    """Phi and nu (C,) alone."""
+    """Phi and nu (C,) of the rows at (x, v)."""
     rows = _evaluated(constraints, x, v)
     return rows.Phi[constraints.numbers], rows.nu[constraints.numbers]
 
@@ -144,7 +144,7 @@ def _jacobian(constraints: Constraints) -> Matrix:
 
 
 def entries_of(model: Model, place: Layout) -> Entries:
-    """Of the rows of a scene; those of the last structures are known by the integers that make them."""
+    """Entries of the rows of a scene; those of the last structures are known by the integers that make them."""
     m = model.markers
     return _entries(
         model.rows.marker.shape[1], *map(_listed, (model.rows.marker, model.rows.start, m.body, m.start)), place
@@ -164,7 +164,7 @@ def _entries(
     phi: tuple[int, ...],
     place: Layout,
 ) -> Entries:
-    """Markers on all sides of the blocks, where the rows of each begin, and of all markers body and beginning in `phi`."""
+    """Entries by markers on all sides of the blocks, first rows of the blocks, and body and place in `phi` of all markers."""
     row, side, lane, first = list[int](), list[int](), list[int](), list[int]()
     flexible = list[tuple[slice, int, int]]()
     for number, marker in enumerate(markers):

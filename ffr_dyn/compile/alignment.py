@@ -46,7 +46,7 @@ def aligned(tables: T) -> T:
 
 
 def in_one_piece(tables: T, but: str = "") -> Piece[T]:
-    """With the arrays of the tables as they are now. Their kind is one that `pack` knows.
+    """Tables with their arrays as they are now, of a kind that `pack` knows.
 
     but : a field that is an empty tuple, of which the words are left open
     """

@@ -100,7 +100,7 @@ def _set_control(control: Control, system: System, method: Controlled, start: fl
 
 
 def _engine(system: System, tables: Tables, words: Array) -> Engine:
-    """With the words of the system's model in those of the tables."""
+    """Engine with the words of the system's model in those of the tables."""
     at = place_of(Tables, "model")
     words[at : at + system.words.size] = system.words
     words[0] = address_of(words)

@@ -47,12 +47,12 @@ class System(Brief):
 
     @cached_property
     def kernels(self) -> tuple[CompiledFunction | str, ...]:
-        """Those of the forces, by number."""
+        """Kernels of the forces, by number."""
         return tuple(kernels_of(self.scene))
 
     @cached_property
     def chosen(self) -> tuple[CompiledFunction | None, ...]:
-        """Of all entry points by number what stands there for the scene; None where it does not call them."""
+        """Compiled forms of all entry points, by number; None for those that the scene does not call."""
         m = self.model
         return tuple(entry.chosen(m) if entry.needed(m) else None for entry in ENTRY_POINTS.values())
 

@@ -80,12 +80,8 @@ def new_tables(system: System, method: Integrator | None, keeps_passed: bool) ->
 
 
 def _blank(system: System, needs: _Needs) -> Tables:
-    place = system.layout
-    X, V, x_chosen, v_chosen = (
-        place.x_size,
-        place.v_size,
-        *(size * needs.controlled for size in (place.x_size, place.v_size)),
-    )
+    X, V = system.layout.x_size, system.layout.v_size
+    chosen = {"numbers": 7, "weight_x": X, "weight_v": V, "x": X, "v": V, "held_x": X, "held_v": V}
     return Tables(
         address=0,
         entry_points=np.zeros(len(system.chosen), dtype=np.int64),
@@ -96,8 +92,7 @@ def _blank(system: System, needs: _Needs) -> Tables:
         clock=Clock(np.zeros(2), np.zeros(3, dtype=np.int64), np.zeros(3)),
         control=Control(
             counts=np.zeros(2, dtype=np.int64),
-            **_zeros(numbers=7 * needs.controlled, weight_x=x_chosen, weight_v=v_chosen),
-            **_zeros(x=x_chosen, v=v_chosen, held_x=x_chosen, held_v=v_chosen),
+            **_zeros(**{key: size * needs.controlled for key, size in chosen.items()}),
         ),
         **_zeros(x=X, v=V),
     )

@@ -41,7 +41,7 @@ def unfollowed(system: System, work: Work, step: float, rows: Record) -> Lost | 
 
 
 def torn_open(system: System, work: Work, step: float) -> Lost | None:
-    """Where a joint was open by too much at the end of a step."""
+    """Time and text of a joint that was open by too much at the end of a step."""
     opened, time = float(work.drift[PHI]), float(work.drift[MOMENT])
     block, word = row_named(system, int(work.drift[OPENED])) if opened > 0 else (None, None)
     if block is not None and word is not None and not opened <= LOST * _whole(system.scene, word):
@@ -55,7 +55,7 @@ def torn_open(system: System, work: Work, step: float) -> Lost | None:
 
 
 def _spun(system: System, step: float, rows: Record) -> Lost | None:
-    """Where a body turns by too much within a step."""
+    """Time and text of a body that turns by too much within a step."""
     speeds = angular_speeds(system.layout, rows.v)
     for b in np.flatnonzero(step * speeds.max(axis=0, initial=0.0) > SPUN)[:1].tolist():
         row = int(np.argmax(speeds[:, b]))

@@ -151,7 +151,7 @@ def marker_axis(scene: Scene, place: Layout, x: Array, v: Array, number: int, a0
 
 
 def marker_direction(scene: Scene, place: Layout, x: Array, number: int, a0: Array) -> Array:
-    """(3,) the value of `marker_axis` alone."""
+    """Value (3,) of `marker_axis`, an axis of a marker in global axes."""
     b, _, point = markers(scene)[number]
     if b == len(scene.bodies):
         return a0

@@ -75,7 +75,7 @@ def initial_state(scene: Scene, place: Layout) -> tuple[Array, Array]:
 
 
 def angular_speeds(place: Layout, v: Array) -> Array:
-    """(T, B) [rad/s] of all bodies, from velocities (T, V)."""
+    """Angular speeds (T, B) [rad/s] of all bodies, from velocities (T, V)."""
     omega = v[:, np.add.outer(np.array(place.iv, dtype=int) + 3, np.arange(3))]
     speeds: Array = np.sqrt((omega * omega).sum(axis=2))
     return speeds

@@ -55,7 +55,7 @@ def rigid_body(
 def _rigid(
     name: str, mass: float, inertia: bytes, centre: bytes, points: tuple[tuple[str, tuple[int, ...], bytes], ...]
 ) -> FlexibleBody:
-    """The last bodies are known by their numbers: scenes of a study have the same crank, and what follows from it is kept."""
+    """Rigid body; the last ones are known by their numbers: runs of a study share a crank, and what follows from it."""
     tensor, c = np.frombuffer(inertia).reshape(3, 3), np.frombuffer(centre)
     about_origin, nothing = tensor + mass * (c @ c * np.eye(3) - np.outer(c, c)), np.zeros((3, 0))
     places = ((key, np.frombuffer(at).reshape(shape)) for key, shape, at in points)
