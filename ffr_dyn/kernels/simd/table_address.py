@@ -102,7 +102,7 @@ def _gather(tables: Any, arrays: list[Array], integers: list[int], numbers: list
 
 
 def address_of(array: Array) -> int:
-    """Address of the first number. `array.ctypes` takes ten times as long, and serves where there is none or it is read only."""
+    """Address of the first number. `array.ctypes` takes ten times as long, and serves where that does not exist."""
     try:
         return ctypes.addressof(ctypes.c_char.from_buffer(array))  # type: ignore[arg-type]
     except (TypeError, ValueError):
