@@ -338,7 +338,7 @@ def test_bores_a_hair_off_are_in_the_plane(plane, beside):
     ("make", "why"),
     [
         (lambda: slider_crank(gravity=(0, -9.81, 1.0)), "gravity has the component 1 m/s"),
-        (heavy_below, "body 'crank' is not symmetric about it: its centre of mass is 0.01 m beside"),
+        (heavy_below, "body 'crank' is not symmetric about it: its centre of mass is 0.01 m off the plane"),
         (
             lambda: slider_crank(ground={"O": (0, 0, 1e-3), "P": (1.0, 0, 0)}),
             r"joint 'main' runs aslant: its points are 0.001 m",
