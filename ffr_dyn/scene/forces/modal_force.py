@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Annotated, Any
 
 import numpy as np
@@ -51,7 +52,7 @@ class ModalForce(Force):
         shape = np.shape(self.values)
         object.__setattr__(self, "values", check_array(self.values, shape[:1], f"{who}: values"))
 
-    @property
+    @cached_property
     def place(self) -> OnBody:
         return OnBody(f"force {self.name!r}", self.body, measured=measured_factor(self))
 

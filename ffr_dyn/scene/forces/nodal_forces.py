@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Annotated, Any
 
 import numpy as np
@@ -71,7 +72,7 @@ class NodalForces(Force):
         object.__setattr__(self, "points", points)
         object.__setattr__(self, "forces", forces)
 
-    @property
+    @cached_property
     def place(self) -> OnBody:
         return OnBody(f"force {self.name!r}", self.body, self.axes, measured_factor(self))
 

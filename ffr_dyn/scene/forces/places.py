@@ -37,6 +37,7 @@ from ffr_dyn.scene.scene import (
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 
+LEVEL = 5e-10  # m, that points of a plane may be apart along its normal
 COORDINATE, RATE, FORCE = range(3)  # columns recorded of a force on one coordinate
 
 
@@ -190,7 +191,7 @@ class AlongLine(Place):
 
     def stays_in_plane(self, scene: Scene, normal: int) -> bool:
         i, j = (undeformed(scene, number)[normal] for number in self.ends(scene))
-        return bool(round(abs(i - j), 9) == 0)
+        return bool(abs(i - j) <= LEVEL)
 
 
 @dataclass(frozen=True)

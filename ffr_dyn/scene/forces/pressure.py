@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Annotated, Any
 
 import numpy as np
@@ -71,7 +72,7 @@ class Pressure(Force):
         if self.triangles is not None and not (isinstance(self.triangles, str) or callable(self.triangles)):
             object.__setattr__(self, "triangles", indices(self.triangles, f"{who}: triangles"))
 
-    @property
+    @cached_property
     def place(self) -> OnBody:
         return OnBody(f"force {self.name!r}", self.body, measured=measured_factor(self))
 
