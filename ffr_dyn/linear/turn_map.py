@@ -272,7 +272,7 @@ class _Estimate:
     def step(self, closing: Array) -> Array:
         """(2 d,) (1 - M)^-1 closing with the derivative of the estimate, along one direction."""
         step = self.known.step(closing)
-        small = DIFFERENCE / max(np.abs(step).max(), 1e-300)
+        small = DIFFERENCE / max(np.abs(step).max(initial=0.0), 1e-300)
         image = _estimated(self.of, self.coarse, self.s + small * step)
         found: Array = step + self.known.step(closing - step + (image - self.image) / small)
         return found
@@ -302,11 +302,11 @@ def _estimated(of: Turns, coarse: int, s: Array, image: Array | None = None) -> 
 
 
 def _corrected_by(of: Turns, estimate: _Estimate) -> Returned | None:
-    """Periods of the right steps, the second of the scene and the first in turn, until a first one returns."""
-    s, errors = estimate.s + estimate.known.step(estimate.image - estimate.s), list[float]()
+    """Periods of the right steps, until the first of the scene returns; in turn with its second, until both do the same."""
+    s, errors, repeats = estimate.s + estimate.known.step(estimate.image - estimate.s), list[float](), False
     while len(errors) < CORRECTED:
         x, v = placed(of, s * of.scale)
-        first = len(errors) % 2 == 1
+        first = repeats or len(errors) % 2 == 1
         record = after(of, x, v, rows=min(ROWS, of.steps) if first else 1, later=0.0 if first else of.period)
         closing = deviation(of, record.x[-1], record.v[-1]) / of.scale - s
         errors.append(float(np.abs(closing).max(initial=0.0)))
@@ -315,6 +315,7 @@ def _corrected_by(of: Turns, estimate: _Estimate) -> Returned | None:
             return Returned(x, v, record, periods, errors[-1], newton=False)
         if first and errors[-1] > FALLING * errors[-2]:
             return None
+        repeats |= first and errors[-1] <= REPEATS
         s = s + estimate.step(closing)
     return None
 
