@@ -300,9 +300,15 @@ def steady_state(assembled: Assembled, time: float, start: Array | None = None) 
 
 
 def _together(found: Steady) -> Machine | None:
-    """The machine with all bodies in the screw of the fastest, where the joints allow it; None where they do not."""
+    """The machine with all bodies in the screw of one of the fastest, where the joints allow it; None where they do not."""
+    speeds = np.linalg.norm(found.machine.screws.w, axis=1)
+    fastest = np.flatnonzero(speeds >= (1 - SAME) * speeds.max())
+    return next((one for b in fastest if (one := _in_screw(found, int(b)))), None)
+
+
+def _in_screw(found: Steady, b: int) -> Machine | None:
+    """The machine with all bodies in the screw of body b; None where joints do not allow it, or they are in it."""
     machine, place = found.machine, found.machine.place
-    b = int(np.argmax(np.linalg.norm(machine.screws.w, axis=1)))
     count = len(machine.screws.w)
     screws = Screws(np.tile(machine.screws.u[b], (count, 1)), np.tile(machine.screws.w[b], (count, 1)))
     change = to_body_axes(place, found.x, velocities(place, screws, found.x) - found.v)

@@ -17,6 +17,7 @@ from scipy.linalg import eig
 from ffr_prep.common.arrays import Array
 
 POINTS, AROUND = 400, 41  # frequencies of a band, and those around each resonance
+GAUSS, BELOW = 3, 1e-5  # points between frequencies of an integral; the first one after zero, of the last
 BESIDE = 1e-3  # of an undamped frequency, as wide as its resonance is taken
 
 
@@ -39,9 +40,7 @@ def transfer(A: Array, B: Array, C: Array, D: Array, frequencies: Array, count: 
     order              : which derivative of that the input is
     """
     s = 2j * np.pi * frequencies
-    one, powers = np.eye(len(A)), s[:, None] ** (np.arange(B.shape[1]) - float(order))
-    H = np.array([C @ _answer(at * one - A, B @ u) + D @ u for at, u in zip(s, powers, strict=True)])
-    H = H.reshape(s.size, len(C))
+    H, powers = receptances(A, B, C, D, frequencies, order), _powers(s, B, order)
     values, left, right = eig(A, left=True, right=True)
     scale = np.einsum("sk,sk->k", left.conj(), right)
     chosen = np.flatnonzero((values.imag > 0) & (np.abs(scale) > 1e-12))
@@ -53,6 +52,19 @@ def transfer(A: Array, B: Array, C: Array, D: Array, frequencies: Array, count: 
     most = np.sort(np.argsort(-size, kind="stable")[:count])
     most = most[np.argsort(np.abs(values[chosen][most]), kind="stable")]
     return Transfer(frequencies, H, parts[:, :, most], chosen[most], values[chosen][most])
+
+
+def receptances(A: Array, B: Array, C: Array, D: Array, frequencies: Array, order: int = 0) -> Array:
+    """(F, O) complex, the transfer function alone; of the input as in `transfer`."""
+    s, one = 2j * np.pi * frequencies, np.eye(len(A))
+    H = np.array([C @ _answer(at * one - A, B @ u) + D @ u for at, u in zip(s, _powers(s, B, order), strict=True)])
+    return H.reshape(s.size, len(C))
+
+
+def _powers(s: Array, B: Array, order: int) -> Array:
+    """(F, P) of the input and its derivatives beside the input."""
+    found: Array = s[:, None] ** (np.arange(B.shape[1]) - float(order))
+    return found
 
 
 def _answer(matrix: Array, right: Array) -> Array:
@@ -81,7 +93,14 @@ def band(values: Array, low: float | None = None, high: float | None = None) -> 
     return found[(found >= first) & (found <= last)]
 
 
-def mean_square(frequencies: Array, density: Array) -> Array:
-    """(O,) integral of densities (F, O) over frequencies (F,)."""
-    found: Array = np.trapezoid(density, frequencies, axis=0)
+def mean_square(A: Array, B: Array, C: Array, D: Array, psd: Array, order: int = 0) -> Array:
+    """(O,) of the outputs under a noise, (K, 2) frequencies [Hz] and one-sided densities, linear in between: by Gauss's
+    formula between its frequencies, those of `band` and zero."""
+    f, density = psd[np.argsort(psd[:, 0], kind="stable")].T
+    ends = np.unique(np.concatenate([f, band(np.linalg.eigvals(A), f[0] or BELOW * f[-1], f[-1])]))
+    half, middle = 0.5 * np.diff(ends), 0.5 * (ends[1:] + ends[:-1])
+    at, weight = np.polynomial.legendre.leggauss(GAUSS)
+    points = (middle[:, None] + half[:, None] * at).ravel()
+    H = receptances(A, B, C, D, points, order)
+    found: Array = (half[:, None] * weight).ravel() * np.interp(points, f, density) @ np.abs(H) ** 2
     return found

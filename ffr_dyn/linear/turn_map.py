@@ -3,11 +3,13 @@
 With P the map of a state over one period by the compiled loop, and deviations in minimal coordinates
 (`ffr_dyn.consistency.tangent`), a periodic motion is a fixed point s = P(s). A motion that settles is found by
 Anderson's mixing of successive periods, which for a linear map is GMRES on s - P(s) = 0 and needs about as many
-periods as there are deviations that decay slowly. Most of them are computed with steps COARSER times as long, whose map Q
-finds s = Q(s) + (P - Q)(s_k) after every period of the right steps: two or three of these suffice (defect correction).
-What does not settle by itself is found by Newton's method, whose matrix, of differences, is the monodromy matrix. Its
-eigenvalues are Floquet's multipliers: small motions grow where one is larger than one. (Walker & Ni, SIAM J. Numer. Anal.
-49 (2011) 1715-1735; Stetter, Numer. Math. 29 (1978) 425-443; Seydel 2010.)
+periods as there are deviations that decay slowly. These are computed with steps COARSER times as long; a period of half
+these steps then tells what becomes of it with the right ones, by the order of the method. From there a period of the right
+steps is corrected by the derivative of that estimate in place of its own (defect correction): two suffice. The first of the
+two is the second period of the scene, the last the first, so that both come back. What does not settle by itself is found by
+Newton's method, whose matrix, of differences, is the monodromy matrix. Its eigenvalues are Floquet's multipliers: small
+motions grow where one is larger than one. (Walker & Ni, SIAM J. Numer. Anal. 49 (2011) 1715-1735; Stetter, Numer. Math. 29
+(1978) 425-443; Seydel 2010.)
 """
 
 from __future__ import annotations
@@ -40,15 +42,15 @@ ROWS = 100  # that a period's record has, or as many as steps
 PERIODS, KEPT = 60, 12  # of the mixing: at most, and how many are mixed
 NEWTONS = 8
 COARSER, FEWEST = (
-    5,
+    10,
     100,
-)  # times the steps, of periods that correct others, and how many steps a period then has at least
-ROUGH, FINER = 1e-6, 1e-3  # closings of coarse periods: at first, and relative to the closing that they correct
+)  # times the steps, of periods that correct others, and how many of these a period has at least
+ROUGH = 1e-6  # closing of the coarse periods
 CORRECTED, FALLING = 6, 0.1  # periods that are corrected: at most, and by how much each must close better
 CLOSED = 1e-12  # of constraints over a period: what a projection leaves open would be a kick at every return
-RETURNS = 1e-11  # of a period that ends where it began: rad, or relative to the scene; rates times the period
+RETURNS = 1e-10  # of a period that ends where it began: rad, or relative to the scene; rates times the period
 STALLED = 0.7  # of a period's closing over that of KEPT periods before, from where mixing gives way to Newton's method
-DIFFERENCE = 1e-5  # the same, of the monodromy matrix; extrapolated
+DIFFERENCE = 1e-5  # the same, of derivatives of a period; those of the monodromy matrix are extrapolated
 LATER = 0.37  # s: when a driver is asked again whether it turns evenly
 REPEATS = 1e-7  # of the second period, the same: drivers and loads that come back
 CORRECTIONS, MET = 12, 1e-13  # of a deviation onto the constraints, and of Phi [m, -]
@@ -60,10 +62,12 @@ class Turns:
     """A compiled scene, its chart at a state, and one period [s] of `steps` steps of a method from the chart's time.
 
     across : (V, C) motions across the free ones, M^-1 jacobian^T
+    sizes : (V,) what counts as a movement of one
     """
 
     near: Chart
     across: Array
+    sizes: Array
     method: Integrator
     period: float
     steps: int
@@ -86,7 +90,8 @@ def turns(system: System, time: float, x: Array, v: Array, method: Integrator, p
     near = chart(evaluator(system), time, x, v)
     jacobian = evaluate(near.at, time, x, v).jacobian
     shortened: Any = method
-    return Turns(near, np.linalg.solve(near.M, jacobian.T), replace(shortened, step=period / steps), period, steps)
+    across, sizes = np.linalg.solve(near.M, jacobian.T), sizes_of(system)
+    return Turns(near, across, sizes, replace(shortened, step=period / steps), period, steps)
 
 
 def period_of(scene: Scene, time: float) -> float:
@@ -142,7 +147,7 @@ def deviation(of: Turns, x: Array, v: Array) -> Array:
     """(2 d,) minimal coordinates of a state near the chart's. Raises ComputationError for one that is not near."""
     near, place = of.near, of.system.layout
     y, V = _between(place, near.x, x), to_body_axes(place, x, v)
-    if np.abs(y / sizes_of(of.system)).max() > AGAIN:
+    if np.abs(y / of.sizes).max() > AGAIN:
         raise ComputationError(
             f"after a period of {of.period:.6g} s the scene is not where it began: the period is not that of its drivers and "
             "loads, or a body goes on turning; give another period"
@@ -189,12 +194,11 @@ class Returned:
 
 def returned(of: Turns) -> Returned:
     """The periodic state near the chart's. Raises ComputationError where there is none."""
-    coarse = _coarser(of)
-    return (_corrected(of, coarse) if coarse else None) or _in_fine_steps(of)
+    return _corrected(of) or _in_fine_steps(of)
 
 
 def _in_fine_steps(of: Turns) -> Returned:
-    s, _, periods, error = _mixed(of, _Known([], []), np.zeros(of.scale.size), RETURNS)
+    s, _, periods, error = _mixed(of, _Known([], []), RETURNS)
     s = s * of.scale
     newton = not error <= RETURNS
     if newton:
@@ -224,60 +228,112 @@ class _Known:
     points: list[Array]
     images: list[Array]
 
+    def step(self, closing: Array) -> Array:
+        """(2 d,) (1 - M)^-1 closing with the derivative M of the map as far as it is known; where it is not, M = 0."""
+        points, images = np.array(self.points[-KEPT:]), np.array(self.images[-KEPT:])
+        if len(points) < 2:
+            return closing
+        shares = np.linalg.lstsq(np.diff(images - points, axis=0).T, closing, rcond=1e-12)[0]
+        found: Array = closing - shares @ np.diff(images, axis=0)
+        return found
 
-def _coarser(of: Turns) -> Turns | None:
-    """The map with longer steps; None where these are too few."""
-    steps, coarse = of.steps // COARSER, COARSER * of.method.step
+
+def _in_steps(of: Turns, steps: int) -> Turns:
+    """The map with another number of steps."""
     method: Any = of.method
-    return replace(of, steps=steps, method=replace(method, step=coarse)) if steps >= FEWEST else None
+    return replace(of, steps=steps, method=replace(method, step=of.period / steps))
 
 
-def _corrected(of: Turns, coarse: Turns) -> Returned | None:
+def _corrected(of: Turns) -> Returned | None:
     """By defect correction; None where coarse steps do not carry it."""
-    known, shift, tolerance = _Known([], []), np.zeros(of.scale.size), ROUGH
-    periods, errors = 0.0, list[float]()
+    try:
+        estimate = _estimate(of)
+        return _corrected_by(of, estimate) if estimate else None
+    except ComputationError:
+        return None
+
+
+@dataclass(frozen=True)
+class _Estimate:
+    """Of the map with the right steps by coarse ones and their halves.
+
+    known : of the map with coarse steps;  s, image : (2 d,) a point that it brings back, and the estimated image
+    begun, each : periods that it took, and that one image takes
+    """
+
+    of: Turns
+    coarse: int
+    known: _Known
+    s: Array
+    image: Array
+    begun: float
+    each: float
+
+    def step(self, closing: Array) -> Array:
+        """(2 d,) (1 - M)^-1 closing with the derivative of the estimate, along one direction."""
+        step = self.known.step(closing)
+        small = DIFFERENCE / max(np.abs(step).max(initial=0.0), 1e-300)
+        image = _estimated(self.of, self.coarse, self.s + small * step)
+        found: Array = step + self.known.step(closing - step + (image - self.image) / small)
+        return found
+
+
+def _estimate(of: Turns) -> _Estimate | None:
+    """Near the state that coarse steps bring back; None where they are too few, or bring back none."""
+    coarse = max(FEWEST, of.steps // COARSER)
+    if 2 * coarse >= of.steps:
+        return None
+    known = _Known([], [])
+    s, image, count, error = _mixed(_in_steps(of, coarse), known, ROUGH)
+    if not error <= ROUGH:
+        return None
+    parts = coarse / of.steps
+    return _Estimate(of, coarse, known, s, _estimated(of, coarse, s, image), (count + 2) * parts, 3 * parts)
+
+
+def _estimated(of: Turns, coarse: int, s: Array, image: Array | None = None) -> Array:
+    """(2 d,) the image of a deviation by the right steps, in units of the scale; `image` by coarse ones is known, perhaps.
+    Errors go as the step to the power of the method's order."""
+    at, power = s * of.scale, of.method.order
+    image = mapped(_in_steps(of, coarse), at) / of.scale if image is None else image
+    change = mapped(_in_steps(of, 2 * coarse), at) / of.scale - image
+    found: Array = image + change * (1 - (coarse / of.steps) ** power) / (1 - 0.5**power)
+    return found
+
+
+def _corrected_by(of: Turns, estimate: _Estimate) -> Returned | None:
+    """Periods of the right steps, until the first of the scene returns; in turn with its second, until both do the same."""
+    s, errors, repeats = estimate.s + estimate.known.step(estimate.image - estimate.s), list[float](), False
     while len(errors) < CORRECTED:
-        try:
-            s, image, count, error = _mixed(coarse, known, shift, tolerance)
-            x, v = placed(of, s * of.scale)
-            record = after(of, x, v, rows=min(ROWS, of.steps))
-            closed = deviation(of, record.x[-1], record.v[-1]) / of.scale
-        except ComputationError:
+        x, v = placed(of, s * of.scale)
+        first = repeats or len(errors) % 2 == 1
+        record = after(of, x, v, rows=min(ROWS, of.steps) if first else 1, later=0.0 if first else of.period)
+        closing = deviation(of, record.x[-1], record.v[-1]) / of.scale - s
+        errors.append(float(np.abs(closing).max(initial=0.0)))
+        if first and errors[-1] <= RETURNS:
+            periods = estimate.begun + len(errors) + (len(errors) - 1) * estimate.each
+            return Returned(x, v, record, periods, errors[-1], newton=False)
+        if first and errors[-1] > FALLING * errors[-2]:
             return None
-        periods += 1 + count / COARSER
-        errors.append(float(np.abs(closed - s).max(initial=0.0)))
-        if errors[-1] <= RETURNS:
-            _check_repeats(coarse, x, v, image * of.scale, errors[-1])
-            return Returned(x, v, record, periods + 1 / COARSER, errors[-1], newton=False)
-        if not error <= tolerance or (len(errors) > 1 and errors[-1] > FALLING * errors[-2]):
-            return None
-        shift, tolerance = closed - image, FINER * errors[-1]
+        repeats |= first and errors[-1] <= REPEATS
+        s = s + estimate.step(closing)
     return None
 
 
-def _mixed(of: Turns, known: _Known, shift: Array, tolerance: float) -> tuple[Array, Array, int, float]:
-    """By Anderson's mixing, the state that the map and a shift (2 d,) bring back: its deviation and its image in units of
-    the scale, how many periods, and the last closing. What is known of the map is used, and grows."""
-    scale, errors = of.scale, list[float]()
+def _mixed(of: Turns, known: _Known, tolerance: float) -> tuple[Array, Array, int, float]:
+    """By Anderson's mixing, the state that the map brings back: its deviation and its image in units of the scale, how many
+    periods, and the last closing. What is known of the map grows."""
+    scale, errors, s = of.scale, list[float](), np.zeros(of.scale.size)
     while len(errors) < PERIODS:
-        points, images = np.array(known.points[-KEPT:]), np.array(known.images[-KEPT:])
-        s = _best(points, images + shift) if len(points) else np.zeros(scale.size)
+        image = mapped(of, s * scale) / scale
         known.points.append(s)
-        known.images.append(mapped(of, s * scale) / scale)
-        errors.append(float(np.abs(known.images[-1] + shift - s).max(initial=0.0)))
+        known.images.append(image)
+        errors.append(float(np.abs(image - s).max(initial=0.0)))
         if errors[-1] <= tolerance or (len(errors) > KEPT and errors[-1] > STALLED * errors[-1 - KEPT]):
             break
+        s = s + known.step(image - s)
     best = int(np.argmin(errors[-KEPT:])) - min(KEPT, len(errors))
     return known.points[best], known.images[best], len(errors), errors[best]
-
-
-def _best(points: Array, images: Array) -> Array:
-    """(2 d,) where the affine map through what is known of it has the least closing, mapped once."""
-    closings = images - points
-    steps = np.diff(closings, axis=0)
-    shares = np.linalg.lstsq(steps.T, closings[-1], rcond=1e-12)[0] if len(steps) else np.zeros(0)
-    found: Array = images[-1] - shares @ np.diff(images, axis=0)
-    return found
 
 
 def monodromy(of: Turns, s: Array) -> Array:

@@ -41,7 +41,8 @@ def in_words(
         what, mode = whats[k], modes[:, k]
         if what is None:
             at = mode[int(np.argmax(np.abs(mode)))]
-            found[k] = named_motion(scene, place, x, (mode * np.conj(at)).real)
+            moving = named_motion(scene, place, x, (mode * np.conj(at)).real)
+            found[k] = f"{moving}, {whirling[k]}" if whirling[k] else moving
             continue
         counts[what] += not np.isclose(last.get(what, -1.0), seen[k], rtol=1e-6, atol=0.0)
         last[what] = seen[k]

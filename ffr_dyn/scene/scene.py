@@ -142,6 +142,7 @@ def altered(thing: Checked, **changes: Any) -> Checked:
 
 
 _PARALLEL = 1e-9  # of entries of a rotation, what is no turn
+ALONG_Z = (0.0, 0.0, 1.0)  # of joints whose axes are not given
 _UNITS = ("m", "e0..e3", "m/s", "rad/s")
 
 
@@ -418,14 +419,15 @@ def _check_names(scene: Scene) -> None:
 
 
 def _as_drawn(scene: Scene, joint: Joint) -> Joint:
-    """The joint; a fixed one without axes with those that keep its bodies turned to each other as they are drawn."""
+    """The joint; a fixed one without axes with those that keep its bodies turned to each other as they are drawn, in all
+    scenes that are made of this one, wherever its bodies are there."""
     if joint.kind != "fixed" or joint.axis is not None or joint.axis_j is not None:
         return joint
     on = (markers(scene)[marker_number(scene, end)][0] for end in (joint.i, joint.j))
     A_i, A_j = (rotation_matrix(scene.bodies[b].rotation) if b < len(scene.bodies) else np.eye(3) for b in on)
     turn = A_j.T @ A_i
     parallel = np.abs(turn - np.eye(3)).max() < _PARALLEL
-    return joint if parallel else replace(joint, axis=np.eye(3).tolist(), axis_j=turn.tolist())
+    return replace(joint, axis=ALONG_Z) if parallel else replace(joint, axis=np.eye(3).tolist(), axis_j=turn.tolist())
 
 
 def _check_joints(scene: Scene) -> None:

@@ -16,7 +16,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ffr_dyn.analyses.registry import OfMoment, option
-from ffr_dyn.analyses.rotating.steady import GROWS, SPEEDS, TURN, distinct
+from ffr_dyn.analyses.rotating.steady import GROWS, SPEEDS, TURN, distinct, growing
 from ffr_dyn.analyses.settings import MomentSettings
 from ffr_dyn.consistency.assemble import assemble, in_space
 from ffr_dyn.linear.prestrained import told
@@ -228,7 +228,8 @@ def _as_result(
     modes = Axis("vibration", tuple(str(k + 1) for k in range(len(names))))
     ratios = np.array([damping_ratios(one.values, one.seen, one.whirl) for one in spectra])
     worst = max((one.prestrained for one in spectra), key=lambda one: one.share)
-    notes = [*distinct(note for one in spectra for note in one.found.notes), *told(worst, names[worst.mode])]
+    unstable = [note for note in [growing(spectra[0].found)] if note]
+    notes = [*distinct(note for one in spectra for note in one.found.notes), *unstable, *told(worst, names[worst.mode])]
     quantities = {
         "speed": Quantity(np.array(speeds), "rad/s", (), "of what turns"),
         "frequencies": Quantity(np.abs(values.imag) / (2 * np.pi), "Hz", (modes,), "in the turning axes"),

@@ -90,7 +90,7 @@ def periodic(
     floquet : also Floquet's multipliers, at the cost of four periods for every state variable
     outputs : names or patterns of the quantities to keep, as in `forward`
 
-    The attributes have the `period`, `periods` (how many were computed, one of five times the steps counting as a fifth),
+    The attributes have the `period`, `periods` (how many were computed, one of a tenth of the steps counting as a tenth),
     `returns` (by how much the end is off the beginning, relative) and, with floquet, `multipliers` (pairs of real and
     imaginary parts, the largest first), `exponents` (growth [1/s] and circular frequency [rad/s] of each), `leading` (what
     moves in each, as of `linearise`) and `stable`.
@@ -106,8 +106,7 @@ def periodic(
     assembled = assemble(scene, time=time)
     selected(assembled.system, outputs)
     of, found = _found(assembled, time, method, period)
-    at = evaluator(assembled.system)
-    first = record_states(at, np.array([time]), found.x[None], found.v[None])
+    first = record_states(of.near.at, np.array([time]), found.x[None], found.v[None])
     record = with_all_reactions(assembled, joined([first, found.record]))
     attributes = {
         **described(scene),

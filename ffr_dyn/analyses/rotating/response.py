@@ -24,6 +24,7 @@ from ffr_dyn.results.file import save_result
 from ffr_dyn.results.result import Axis, Quantity, Result
 from ffr_dyn.scene.described import described
 from ffr_dyn.scene.scene import Scene, require_scene
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 
 About = Literal["start", "equilibrium", "steady"]
@@ -135,7 +136,8 @@ def response(
                axes do not turn with the bodies
 
     The result has `frequency` [Hz], and of each output `gain`, `phase` [deg], `transfer` (real and imaginary), and `parts` of
-    it by the modes that do most, named in the attribute "modes"; with a psd `density` and the attribute "rms".
+    it by the modes that do most, named in the attribute "modes"; with a psd `density` and the attribute "rms",
+    of all of the noise, whatever frequencies are told.
 
         found = fd.response(scene, input="hinge.moment", outputs=("arm.tip.acceleration.y",))
         fd.draw_bode(found, "bode.png")
@@ -160,7 +162,9 @@ def response(
     found = transfer(linear.A, linear.B, linear.C, linear.D, f, PARTS, acts.order or 0)
     if envelopes is not None:
         linear = replace(linear, notes=(*linear.notes, *beside(envelopes, f[:: max(1, f.size // 50)], names)))
-    result = _as_result(scene, linear, found, told(acts, input), tuple(psd), time)
+    result = _as_result(
+        scene, linear, found, told(acts, input), np.array(psd, float).reshape(-1, 2), acts.order or 0, time
+    )
     if path is not None:
         save_result(result, path)
     return result
@@ -199,7 +203,7 @@ def _by_motion(free: Linearisation, held: Scene, time: float) -> Linearisation:
 
 
 def _as_result(
-    scene: Scene, linear: Linearisation, found: Transfer, words: str, psd: tuple[Any, ...], time: float
+    scene: Scene, linear: Linearisation, found: Transfer, words: str, psd: Array, order: int, time: float
 ) -> Result:
     outputs = Axis("of", tuple(name.replace(".", " ") for name in linear.outputs))
     names = _mode_names(linear, found)
@@ -216,11 +220,11 @@ def _as_result(
         split = np.stack([found.parts.real, found.parts.imag], axis=3)
         quantities["parts"] = Quantity(split, "1", (outputs, modes, parts), "transfer functions of single modes")
     more: dict[str, Any] = {}
-    if psd:
-        f, s = np.array(sorted(psd)).T
+    if psd.size:
+        f, s = psd[np.argsort(psd[:, 0], kind="stable")].T
         density = np.abs(H) ** 2 * np.interp(found.frequencies, f, s, left=0.0, right=0.0)[:, None]
         quantities["density"] = Quantity(density, "1/Hz", (outputs,), "one-sided, of the output squared")
-        rms = np.sqrt(mean_square(found.frequencies, density))
+        rms = np.sqrt(mean_square(linear.A, linear.B, linear.C, linear.D, psd, order))
         more["rms"] = dict(zip(linear.outputs, rms.tolist(), strict=True))
     attributes = {
         **described(scene),
@@ -229,7 +233,7 @@ def _as_result(
         "input": words,
         "outputs": list(linear.outputs),
         "modes": names,
-        "notes": [*linear.notes, *_undamped(found, psd)],
+        "notes": [*linear.notes, *_undamped(np.linalg.eigvals(linear.A), psd)],
         "status": "complete",
         **more,
     }
@@ -242,10 +246,11 @@ def _mode_names(linear: Linearisation, found: Transfer) -> list[str]:
     return [linear.leading[k] for k in nearest]
 
 
-def _undamped(found: Transfer, psd: tuple[Any, ...]) -> list[str]:
-    bare = found.values[np.abs(found.values.real) <= 1e-9 * np.abs(found.values)]
-    inside = [v for v in bare if found.frequencies[0] <= abs(v.imag) / (2 * np.pi) <= found.frequencies[-1]]
-    if not psd or not inside:
+def _undamped(values: Array, psd: Array) -> list[str]:
+    f = psd[:, 0]
+    bare = values[(values.imag > 0) & (np.abs(values.real) <= 1e-9 * np.abs(values))]
+    inside = [v for v in bare if f.min(initial=np.inf) <= v.imag / (2 * np.pi) <= f.max(initial=-np.inf)]
+    if not inside:
         return []
     return [
         f"the vibration of {abs(inside[0].imag) / 2 / np.pi:.5g} Hz has no damping: noise excites it without bound, and the "

@@ -128,7 +128,10 @@ def growing(found: Found) -> str:
         return ""
     k = int(np.argmax(np.where(faster, one.values.real, -np.inf)))
     speed = found.machine.screws.fastest
-    return f"at {speed:.6g} rad/s the steady motion is unstable: {one.names[k]} grows by {one.values[k].real:.4g} 1/s"
+    return (
+        f"at {speed:.6g} rad/s the steady motion is unstable: {one.names[k]} grows by {one.values[k].real:.4g} 1/s; where "
+        "another is stable, let the scene start nearer to it"
+    )
 
 
 def steady_states(

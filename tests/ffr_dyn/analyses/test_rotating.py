@@ -339,3 +339,27 @@ def test_a_scene_file_holds_them_there_and_back(tmp_path, kind):
     scene, settings = fd.load_scene(file)
     fd.save_scene(scene, settings, tmp_path / "again.toml")
     assert fd.load_scene(tmp_path / "again.toml")[1] == settings
+
+
+def test_the_rms_is_that_of_the_whole_noise_whatever_frequencies_are_told():
+    """Of two masses, by Lyapunov's equation for white noise; of a narrow peak in a wide band, by its area."""
+    m, k, c = 2.0, 200.0, 3.0
+    scene = sprung_mass(m, k, c)
+    S, outputs = 0.02, ["m.R.x"]
+    white = ((0.0, S), (5e3, S))
+    for frequencies in ((), (1.0, 2.0)):
+        found = fd.response(scene, input="rail.force", outputs=outputs, psd=white, frequencies=frequencies)
+        assert found.attributes["rms"]["m.R.x"] == pytest.approx(np.sqrt(S / (4 * c * k)), rel=1e-5)
+    f, wide = 7.0, 1e-3
+    peak = ((0.1, 0.0), (f - wide, 0.0), (f, S), (f + wide, 0.0), (500.0, 0.0))
+    w = 2 * np.pi * f
+    expected = np.sqrt(S * wide) / abs(k - m * w**2 + 1j * c * w)
+    found = fd.response(scene, input="rail.force", outputs=outputs, psd=peak)
+    assert found.attributes["rms"]["m.R.x"] == pytest.approx(expected, rel=1e-5)
+
+
+def sprung_mass(m: float, k: float, c: float) -> fd.Scene:
+    mass = fd.rigid_body("m", mass=m, inertia=(1, 1, 1), points={"c": (0, 0, 0)})
+    rail = fd.Joint("rail", "translational", "ground.O", "m.c", axis=(1, 0, 0))
+    spring = fd.JointSpring("spring", "rail", stiffness=k, damping=c, coordinate="stroke")
+    return fd.Scene((fd.Body("m", mass),), (rail,), forces=(spring,), ground={"O": (0, 0, 0)})

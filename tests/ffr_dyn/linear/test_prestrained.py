@@ -40,8 +40,8 @@ def test_what_is_missing_of_a_frequency_is_told_where_it_is_much():
     assert doubts(turning(20.0)) == []
     (note,) = doubts(turning(78.5))
     assert note.startswith("body 'blade' is deformed")
-    assert "up to 0.005 may be missing" in note
-    assert note.endswith("4 parts would do (ffr-prep reduce --parts)")
-    assert doubts(turning(78.5, parts=4)) == []
+    assert "up to 0.009 may be missing" in note
+    assert note.endswith("3 parts would do (ffr-prep reduce --parts)")
+    assert doubts(turning(78.5, parts=3)) == []
     told = fd.campbell(turning(1.0), speeds=(20.0, 78.5)).attributes["notes"]
     assert [one for one in told if "beyond second order" in one]

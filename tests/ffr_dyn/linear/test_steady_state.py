@@ -136,3 +136,28 @@ def test_a_run_begins_in_it_and_stays():
     how = {"end": 0.02, "output_step": 1e-3, "method": fd.RK4(5e-6), "check": False}
     q = fd.forward(rotor(200.0, stiffening=True), begin="steady", **how)["rod.q"]
     assert np.ptp(q, axis=0).max() < 1e-7 * np.abs(q).max()
+
+
+def test_an_unbalanced_disc_whirls_about_the_axis_of_what_drives_it():
+    """Not about its centre of mass, where it was at rest: |r| = m e W^2 / |k - m W^2 + i c W|, with the torque c W |r|^2."""
+    m, k, c, e, speed = 5.0, 5e4, 60.0, 1e-4, 140.0
+    hub = fd.rigid_body("hub", mass=1.0, inertia=(0.01,) * 3, points={"c": (0, 0, 0)})
+    disc = fd.rigid_body("disc", mass=m, inertia=(0.02, 0.02, 0.04), centre_of_mass=(e, 0, 0), points={"c": (0, 0, 0)})
+    scene = fd.Scene(
+        (fd.Body("hub", hub), fd.Body("disc", disc)),
+        (
+            fd.Joint("bearing", "revolute", "ground.O", "hub.c"),
+            fd.Joint("turned", "orientation", "hub.c", "disc.c"),
+            fd.Joint("plane", "point-on-plane", "hub.c", "disc.c", axis=(0, 0, 1)),
+        ),
+        (fd.Driver("motor", "bearing", fd.polynomial(0.0, speed)),),
+        forces=(
+            fd.Bushing("shaft", "hub.c", "disc.c", np.diag([k, k, 0, 0, 0, 0])),
+            fd.Bushing("air", "ground.O", "disc.c", np.zeros((6, 6)), np.diag([c, c, 0, 0, 0, 0])),
+        ),
+        ground={"O": (0, 0, 0)},
+    )
+    found = fd.steady(scene)
+    r = m * e * speed**2 / (k - m * speed**2 + 1j * c * speed)
+    assert found["disc.c.position"][-1] == pytest.approx([r.real, r.imag, 0.0], abs=1e-12)
+    assert found["motor.effort"][-1] == pytest.approx(c * speed * abs(r) ** 2, rel=1e-6)

@@ -96,7 +96,7 @@ def test_a_driven_machine_ends_where_a_long_run_does():
     scene = flexible_crank(loads=())
     found = fd.periodic(scene)
     assert found.attributes["returns"] < 1e-10
-    assert found.attributes["periods"] < 6
+    assert found.attributes["periods"] <= 4
     step, period = found.attributes["period"] / 1000, found.attributes["period"]
     how = {"output_step": period / 100, "method": fd.ROS3(step), "stabilisation": fd.Projection(1e-12), "check": False}
     again = fd.forward(scene, end=period, begin="periodic", **how)

@@ -294,3 +294,15 @@ def test_parts_know_better_where_a_body_bends():
     assert "body 'beam_1' deforms" in note
     assert f"{parts_needed(scene, result)['beam']} parts would do" in note
     assert parts_needed(scene, result)["beam"] > 5
+
+
+def test_a_bent_body_in_parts_stays_as_it_is_where_a_result_has_left_it():
+    """The joints between its parts hold them as they are drawn, not as they are turned then: statics ends where it begins."""
+    still = clamped(BEAMS[2], loads=(Load("push", "beam.tip", force=(0.0, 50.0, 0.0)),))
+    bent = static(still)
+    again = static(scene_at(still, bent))
+    there = "beam.tip.position"
+    np.testing.assert_allclose(again[there][-1], bent[there][-1], atol=1e-9)
+    assert not [
+        note for note in linearise(scene_at(still, bent)).notes if "assembly" in note or "no equilibrium" in note
+    ]
