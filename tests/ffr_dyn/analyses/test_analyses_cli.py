@@ -226,16 +226,16 @@ def test_a_command_goes_before_the_file(run_file):
         (TIMES, ["inverse", "--quasi-static", "--keep", "rod.tip.positoin"], "did you mean rod.tip.position"),
     ],
 )  # fmt: skip
-def test_what_does_not_fit_the_file_is_refused(run_file, analysis, command, words):
-    failed, _, file = run_file(analysis, *command)
+def test_what_does_not_fit_the_file_is_refused(run_file, tmp_path, analysis, command, words):
+    failed, _, _ = run_file(analysis, *command)
     assert isinstance(failed, InputError)
     assert words in str(failed)
-    assert not file.exists()
+    assert not list(tmp_path.glob("*.nc"))
 
 
 def test_forces_away_from_the_motion_refuse_unknown_quantities_first(run_file):
     unknown = "f=rod.tip:0,1,0"
-    failed, _, file = run_file(TIMES, "mixed", "--unknown", unknown, "--keep", "rod.nothing")
+    failed, _, _ = run_file(TIMES, "mixed", "--unknown", unknown, "--keep", "rod.nothing")
     assert isinstance(failed, InputError)
     assert "rod.nothing" in str(failed)
     failed, _, file = run_file(TIMES, "mixed", "--unknown", unknown, "--keep", "rod.tip.acceleration")
