@@ -64,25 +64,25 @@ class PlanarBeam:
     @cached_property
     def values(self) -> Array:
         """(G, N) shape functions at the Gauss points of the energy, one less than nodes in an element: no locking."""
-        return self._at(*np.polynomial.legendre.leggauss(self.degree))[0]
+        return self.at(*np.polynomial.legendre.leggauss(self.degree))[0]
 
     @cached_property
     def slopes(self) -> Array:
         """(G, N) their derivatives by s [1/m]."""
-        return self._at(*np.polynomial.legendre.leggauss(self.degree))[1]
+        return self.at(*np.polynomial.legendre.leggauss(self.degree))[1]
 
     @cached_property
     def weights(self) -> Array:
         """(G,) of the Gauss points [m]."""
-        return self._at(*np.polynomial.legendre.leggauss(self.degree))[2]
+        return self.at(*np.polynomial.legendre.leggauss(self.degree))[2]
 
     @cached_property
     def mass(self) -> Array:
         """(3N, 3N), constant."""
-        N, _, weights = self._at(*np.polynomial.legendre.leggauss(self.degree + 1))
+        N, _, weights = self.at(*np.polynomial.legendre.leggauss(self.degree + 1))
         return np.kron(N.T @ (weights[:, None] * N), np.diag([self.m, self.m, self.mI]))
 
-    def _at(self, points: Array, weights: Array) -> tuple[Array, Array, Array]:
+    def at(self, points: Array, weights: Array) -> tuple[Array, Array, Array]:
         """Shape functions, their derivatives and weights at points in [-1, 1] of every element."""
         modal = np.linalg.inv(np.polynomial.legendre.legvander(_lobatto(self.degree), self.degree))
         value = np.polynomial.legendre.legvander(points, self.degree) @ modal

@@ -92,7 +92,8 @@ def tables_in_blocks(owners: Sequence[Hashable], make: Callable[[int], tuple[Arr
     for b, owner in enumerate(owners):
         if owner not in stored:
             stored[owner] = make(b)
-    pool, first = once([stored[owner][0] for owner in owners], owners)
+    in_lanes = {owner: np.pad(pool, (0, -pool.size % LANES)) for owner, (pool, _) in stored.items()}
+    pool, first = once([in_lanes[owner] for owner in owners], owners)
     plans, first_plan = once([stored[owner][1] for owner in owners], owners)
     zero = np.array([not stored[owner][0].size for owner in owners], dtype=bool)
     padded = np.concatenate([pool, np.zeros(LANES)])  # whole rows of lanes are read

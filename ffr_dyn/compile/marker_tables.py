@@ -11,7 +11,7 @@ from ffr_dyn.compile.symmetry_blocks import in_blocks
 from ffr_dyn.equations.constraint_rows import Block
 from ffr_dyn.equations.layout import Layout
 from ffr_dyn.equations.second_order import is_second_order, marker_matrices
-from ffr_dyn.kernels.tables import Markers
+from ffr_dyn.kernels.tables import LANES, Markers
 from ffr_dyn.scene.force_kinds import forces_of, loaded_markers
 from ffr_dyn.scene.joints import COINCIDENCE, DISTANCE
 from ffr_dyn.scene.scene import Body, Scene, marker_number, markers
@@ -60,7 +60,8 @@ def _bending(body: Body, point: str, rows: tuple[int, ...]) -> tuple[Array, Arra
     def make() -> tuple[Array, Array]:
         K, kept, at = marker_matrices(body, point), list(rows), body.model.interface(point)
         pool, plan = in_blocks(-np.moveaxis(K[kept], 1, 0), len(kept), rounding_of(K)[kept])
-        return np.concatenate([np.concatenate([at.phi_t, at.phi_r])[kept].ravel(), pool]), plan
+        straight = np.concatenate([at.phi_t, at.phi_r])[kept].ravel()
+        return np.concatenate([np.pad(straight, (0, -straight.size % LANES)), pool]), plan
 
     return remembered(body.model, ("bending", point, rows), make)
 

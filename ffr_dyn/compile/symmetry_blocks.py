@@ -8,19 +8,18 @@ entries. A body without symmetry is one block.
 
 from __future__ import annotations
 
-from itertools import pairwise
-
 import numpy as np
 
-from ffr_dyn.kernels.tables import LANES
+from ffr_dyn.kernels.tables import LANES, MIXED, SORTED, WHOLE
 from ffr_dyn.variants.families import families
 from ffr_prep.common.arrays import Array
 
-Block = tuple[int, int, int, int]  # first coordinate, how many, first product, how many
+Part = tuple[Array, Array]  # coordinates of a family, and products that are sums over them
 
-# What sorting costs: as much as this many multiplications per product (measured with 8 to 64 coordinates).
-SORTING = 8
-BLOCK = 96  # what a block costs, likewise
+# What is dear, in multiplications (measured with 8 to 64 coordinates): a block; a row of lanes that is brought to its place;
+# a product that is, alone.
+BLOCK, BROUGHT, ALONE = 96, 16, 6
+FEW = 8  # coordinates, which are not worth the search
 
 
 def in_blocks(table: Array, last: int, noise: Array) -> tuple[Array, Array]:
@@ -28,92 +27,78 @@ def in_blocks(table: Array, last: int, noise: Array) -> tuple[Array, Array]:
 
     table : table[i, c, j] = +-table[j, c, i]
     last  : so many of the last components are multiplied by q_dot, too
-    noise : (C,) entries that are not larger are rounding
+    noise : (C,) entries that are not larger couple nothing; they are left out between families that nothing else couples
 
-    plan, of integers: number of blocks; 1 where they are in the order of coordinates and products, or 0; the first product
-    that is multiplied by q_dot, too; of each block its first coordinate and how many, its first product and how many, by
-    ascending products. Where they are sorted by family: the numbers of the coordinates; where the products of all components
-    are found, and those of the last (past the end where they vanish).
+    The plan, of integers, begins with the numbers that `ffr_dyn.kernels.tables.BLOCKS` and what follows it name. Of each
+    block its first coordinate and how many, its first sum and how many, in whole rows of lanes in the pool. Where coordinates
+    are SORTED, of each run of at most a row of lanes, by ascending products: where it is among the sums, where it belongs
+    among the products; what is written beyond it, the next writes again. Where they are MIXED, their numbers by family, and
+    where each product is among the sums.
     """
     n, C, _ = table.shape
-    coupled = np.abs(table) > noise[:, None]
-    whole = [(0, n, 0, (C - last) * n), (0, n, (C - last) * n, last * n)]
-    if n <= SORTING:
-        return _in_order(table, whole, last)
-    family = families(coupled)
-    found = _fewest(coupled, _apart(family))
-    sorted_pool, sorted_plan = _by_family(np.where(coupled, table, 0.0), coupled, family, last)
-    costs = [_cost(whole), _cost(found), SORTING * C * n + sorted_pool.size + BLOCK * int(sorted_plan[0])]
-    if costs[2] < min(costs[:2]):
-        return sorted_pool, sorted_plan
-    return (
-        _in_order(table, whole, last) if costs[0] <= costs[1] else _in_order(np.where(coupled, table, 0.0), found, last)
-    )
-
-
-def _by_family(table: Array, coupled: Array, family: Array, last: int) -> tuple[Array, Array]:
-    """Pool and plan of a table sorted by family: two blocks of each, of which one is multiplied by q_dot, too."""
-    n, C, _ = table.shape
     rows, early = table.reshape(n, C * n), (C - last) * n
+    every, products = np.arange(n), np.arange(C * n)
+    whole = [(every, products[:early]), (every, products[early:])]
+    if n > FEW:
+        coupled = np.abs(table) > noise[:, None]
+        parts, order = _by_family(coupled, early)
+        plan, cost = _sorted_plan(parts, order, early, C * n)
+        if cost < _cost(whole):
+            return _pool(rows, parts), plan
+    blocks = [(0, n, int(k[0]), k.size) for _, k in whole if k.size]
+    return _pool(rows, whole), np.array([len(blocks), WHOLE, early, 0, 0, 0, *np.ravel(blocks)], dtype=np.int64)
+
+
+def _by_family(coupled: Array, early: int) -> tuple[list[Part], Array]:
+    """Of each family what it makes of the products before `early`, then of the others; the coordinates by family."""
+    family = families(coupled)
     owner = np.where(coupled.any(axis=0), family[coupled.argmax(axis=0)], -1).ravel()
-    order, pool, blocks, places = [], [], [], np.full(C * n, C * n)
-    count, begin = 0, 0
-    for late in (False, True):
-        first = 0
-        for one in np.unique(family):
-            i, k = np.flatnonzero(family == one), np.flatnonzero(owner == one)
-            k = k[(k >= early) == late]
-            if k.size:
-                pool.append(rows[np.ix_(i, k)].ravel())
-                blocks.append((first, i.size, count, k.size))
-                places[k] = count + np.arange(k.size)
-                count += k.size
-            first += i.size
-            order += [] if late else [i]
-        begin = begin if late else count
-    late_places = np.where(places[early:] < C * n, places[early:] - begin, last * n)
-    head = np.array([len(blocks), 0, begin, *(number for block in blocks for number in block)])
-    return np.concatenate([np.zeros(0), *pool]), np.concatenate([head, *order, places, late_places]).astype(np.int64)
+    members = [np.flatnonzero(family == one) for one in np.unique(family)]
+    found = [np.flatnonzero(owner == one) for one in np.unique(family)]
+    return [
+        *((i, k[k < early]) for i, k in zip(members, found, strict=True)),
+        *((i, k[k >= early]) for i, k in zip(members, found, strict=True)),
+    ], np.concatenate(members)
 
 
-def _in_order(table: Array, blocks: list[Block], last: int) -> tuple[Array, Array]:
-    n, C, _ = table.shape
-    rows, kept = table.reshape(n, C * n), [block for block in blocks if block[3]]
-    pool = np.concatenate([rows[i : i + count, k : k + width].ravel() for i, count, k, width in kept])
-    return pool, np.concatenate([[len(kept), 1, (C - last) * n], *kept]).astype(np.int64)
+def _sorted_plan(parts: list[Part], order: Array, early: int, size: int) -> tuple[Array, float]:
+    """Plan and cost of `size` products that are found family by family."""
+    first, count, late = np.argsort(order), 0, 0
+    blocks, place = [], np.full(size, -1)
+    for i, k in parts:
+        if k.size:
+            blocks.append((int(first[i[0]]), i.size, count, _lanes(k.size)))
+            place[k] = count + np.arange(k.size)
+            count += _lanes(k.size)
+            late = count if k[0] < early else late
+    place[place < 0] = count
+    head, cost = [len(blocks), SORTED, late, count], _cost(parts)
+    if np.any(np.diff(order) < 0):
+        plan = np.concatenate([[len(blocks), MIXED, late, count, 0, 0], np.ravel(blocks), order, place])
+        return plan.astype(np.int64), cost + ALONE * (2 * size - early)
+    runs = _runs(place, early)
+    of_both = sum(k >= early for _, k in runs)
+    plan = np.concatenate([[*head, len(runs), of_both], np.ravel(blocks), np.ravel(runs)])
+    return plan.astype(np.int64), cost + BROUGHT * (len(runs) + of_both)
 
 
-def _apart(family: Array) -> Array:
-    """Where coordinates may be parted in their order without parting a family, ends included."""
-    n = family.size
-    last = {int(f): k for k, f in enumerate(family)}
-    reach = np.maximum.accumulate([last[int(f)] for f in family])
-    return np.array([0, *(k + 1 for k in range(n) if reach[k] == k)])
+def _runs(place: Array, early: int) -> list[tuple[int, int]]:
+    """Where runs of at most a row of lanes are among the sums, and where among the products, from the places of products."""
+    ends = np.flatnonzero((np.diff(place) != 1) & ((np.diff(place) != 0) | (place[1:] < place.max()))) + 1
+    parts = np.split(np.arange(place.size), np.union1d(ends, [early]).astype(int))
+    return [(int(place[k]), int(k)) for part in parts for k in part[::LANES]]
 
 
-def _blocks(coupled: Array, first: Array) -> list[Block]:
-    """Of every run of coordinates, which begin at `first`, and every component: its products and what makes them."""
-    found: list[Block] = []
-    for c in range(coupled.shape[1]):
-        for begin, end in pairwise(first.tolist()):
-            of = np.flatnonzero(coupled[:, c, begin:end].any(axis=1))
-            one, count = (int(of[0]), int(of[-1] - of[0] + 1)) if of.size else (0, 0)
-            found.append((one, count, c * len(coupled) + begin, end - begin))
-    return found
+def _pool(rows: Array, parts: list[Part]) -> Array:
+    """The entries of the rows part by part, with zeros up to whole rows of lanes."""
+    padded = np.pad(rows, ((0, 0), (0, 1)))
+    blocks = [padded[np.ix_(i, np.pad(k, (0, _lanes(k.size) - k.size), constant_values=-1))].ravel() for i, k in parts]
+    return np.concatenate([np.zeros(0), *blocks])
 
 
-def _fewest(coupled: Array, first: Array) -> list[Block]:
-    """The blocks of runs that begin at `first`, or of fewer runs while that costs less."""
-    best, runs = _blocks(coupled, first), first
-    while len(runs) > 2:
-        fewer = [np.delete(runs, k) for k in range(1, len(runs) - 1)]
-        tried = [_blocks(coupled, one) for one in fewer]
-        k = int(np.argmin([_cost(blocks) for blocks in tried]))
-        if _cost(tried[k]) > _cost(best):
-            break
-        best, runs = tried[k], fewer[k]
-    return best
+def _lanes(count: int) -> int:
+    return -(-count // LANES) * LANES
 
 
-def _cost(blocks: list[Block]) -> int:
-    return sum(BLOCK + count * -(-width // LANES) * LANES for _, count, _, width in blocks)
+def _cost(parts: list[Part]) -> int:
+    return sum(BLOCK + i.size * _lanes(k.size) for i, k in parts if k.size)

@@ -182,7 +182,7 @@ def _body_work(m: Model, keeps_terms: bool) -> BodyWork:
         dinv=np.ones(m.bodies.omega2.size),
         terms=starts(spaced)[:-1] * keeps_terms,
         **_zeros(omega=(B + 1, 3), s=(B, 3), J=(B, 3, 3), inverse=(B, 2), g=9 * terms, l=3 * terms),
-        sorted=np.zeros(17 * longest + 4 * LANES),
+        sorted=np.zeros(42 * longest + 6 * LANES),
         **_zeros(H=3 * E, L=(B, 6, 6), f=V, acc=V, T=(B, 3, 3), rigid=(B, 6)),
         **_zeros(more=V, settled=V if m.bodies.coupled_damping.size else 0, solved=V * (m.relaxation > 0.0)),
     )

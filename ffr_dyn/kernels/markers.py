@@ -52,8 +52,9 @@ def bend_marker(markers, w, k, n, normal, q, qd):
     """Shapes of marker k of a second-order body at q; w.six: elastic motion, its rate, - q_dot K q_dot."""
     count, start, plan = markers.second[k, COUNT], markers.second[k, IN_BENDING], markers.second[k, BEND_PLAN]
     size, phi = count * n, part(w.phi, markers.start[k], 6 * n)
+    table = start + (size + LANES - 1) // LANES * LANES
     straight, now, change = part(markers.bending, start, size), part(w.bent, 0, size), part(w.bent, size + LANES, size)
-    contract(markers.bending, start + size, markers.blocks, plan, q, qd, size, size, w.sorted, straight, now, change)
+    contract(markers.bending, table, markers.blocks, plan, q, qd, size, size, w.sorted, straight, now, change)
     fill(part(w.six, 0, 18), 0.0)
     for component in range(count):
         row, at = row_of(component, normal), component * n

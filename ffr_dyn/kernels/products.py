@@ -8,7 +8,7 @@ Twin: `ffr_dyn.equations.inertia.moments`.
 from ffr_dyn.kernels.options import kernel
 from ffr_dyn.kernels.simd.lanes import load, plus, store, zeros
 from ffr_dyn.kernels.simd.slices import part, peek
-from ffr_dyn.kernels.tables import LANES, STRIPS
+from ffr_dyn.kernels.tables import BLOCKS, EARLY, HEAD, HOW, LANES, LATE_RUNS, MIXED, RUNS, STRIPS, SUMS, WHOLE
 from ffr_dyn.kernels.vectors import copy, fill
 
 
@@ -62,14 +62,15 @@ def multiply_both(count, width, table, start, x, xd, first, y, yd, at, late):
 
 @kernel
 def multiply_blocks(table, start, plan, at, blocks, x, xd, early, y, yd):
-    """Block after block, in the order of their products: what one writes beyond its own, the next writes again."""
+    """Block after block, in the order of their sums: what one writes beyond its own, the next writes again."""
     for block in range(at, at + 4 * blocks, 4):
         first, count, out, width = plan[block], plan[block + 1], plan[block + 2], plan[block + 3]
+        stride = (width + LANES - 1) // LANES * LANES
         if out >= early:
-            multiply_both(count, width, table, start, x, xd, first, y, yd, out, out - early)
+            multiply_both(count, stride, table, start, x, xd, first, y, yd, out, out - early)
         else:
-            multiply(count, width, table, start, x, first, y, out)
-        start += count * width
+            multiply(count, stride, table, start, x, first, y, out)
+        start += count * stride
 
 
 @kernel
@@ -79,26 +80,34 @@ def contract(table, start, plan, at, q, qd, width, last, scratch, base, g, l):  
     Block by block, as the plan that begins at `at` says (see `ffr_dyn.compile.symmetry_blocks`); a table that starts below
     zero vanishes. g, l and the scratch are written beyond what is found, by less than a row of lanes.
     """
-    n = q.size
     if start < 0:
         copy(g, base)
         fill(l, 0.0)
         return
-    blocks, given, early = plan[at], plan[at + 1], plan[at + 2]
-    if given > 0:
-        multiply_blocks(table, start, plan, at + 3, blocks, q, qd, early, g, l)
+    n, early, sums, how = q.size, plan[at + EARLY], plan[at + SUMS], plan[at + HOW]
+    x, xd, y, yd = q, qd, g, l
+    runs = at + HEAD + 4 * plan[at + BLOCKS]
+    if how != WHOLE:
+        y, yd = part(scratch, 0, sums + LANES), part(scratch, sums + LANES, sums - early + LANES)
+        store(y, sums, zeros())  # where products vanish
+        store(yd, sums - early, zeros())
+    if how == MIXED:
+        behind = 2 * (sums + LANES) - early
+        x, xd = part(scratch, behind, n), part(scratch, behind + n, n)
+        for k in range(n):
+            x[k], xd[k] = peek(q, peek(plan, runs + k)), peek(qd, peek(plan, runs + k))
+    multiply_blocks(table, start, plan, at + HEAD, plan[at + BLOCKS], x, xd, early, y, yd)
+    if how == MIXED:
+        place = runs + n
         for k in range(width):
-            g[k] += base[k]
+            g[k] = base[k] + peek(y, peek(plan, place + k))
+        for k in range(last):
+            l[k] = peek(yd, peek(plan, place + width - last + k) - early)
         return
-    order = at + 3 + 4 * blocks
-    place, late = order + n, order + n + width
-    x, xd, found = part(scratch, 0, n), part(scratch, n, n), 2 * n
-    y, yd = part(scratch, found, width + 2 * LANES), part(scratch, found + width + 2 * LANES, last + 2 * LANES)
-    for k in range(n):
-        x[k], xd[k] = peek(q, peek(plan, order + k)), peek(qd, peek(plan, order + k))
-    multiply_blocks(table, start, plan, at + 3, blocks, x, xd, early, y, yd)
-    y[width], yd[last] = 0.0, 0.0  # where the plan has products that vanish
+    end = runs + 2 * plan[at + RUNS]
+    for run in range(runs, end, 2):
+        store(g, peek(plan, run + 1), load(y, peek(plan, run)))
+    for run in range(end - 2 * plan[at + LATE_RUNS], end, 2):
+        store(l, peek(plan, run + 1) - (width - last), load(yd, peek(plan, run) - early))
     for k in range(width):
-        g[k] = base[k] + peek(y, peek(plan, place + k))
-    for k in range(last):
-        l[k] = peek(yd, peek(plan, late + k))
+        g[k] += base[k]

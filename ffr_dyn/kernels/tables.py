@@ -47,6 +47,12 @@ OK, SINGULAR_BODY, SINGULAR_CONSTRAINT, NOT_FINITE, USER_FAILED, NOT_CONVERGED, 
 LANES = 8  # rows of a joint side by side (see `ffr_dyn.kernels.simd.lanes`)
 STRIPS = 4  # rows of eight that products of a body are found in at a time
 
+# What the plan of a table in blocks begins with (see `ffr_dyn.compile.symmetry_blocks`): how many blocks; how the products
+# are found; the first sum that is multiplied by q_dot, too; how many sums, runs, and runs of what is multiplied by q_dot.
+BLOCKS, HOW, EARLY, SUMS, RUNS, LATE_RUNS, HEAD = range(7)
+# Sums are the products, in their order; are brought to their places; coordinates are brought together, too.
+WHOLE, SORTED, MIXED = range(3)
+
 # Which markers are brought up to date: those that joints or loads use, those of joints, all.
 IN_USE, OF_JOINTS, ALL = 0, 1, 2
 
@@ -191,7 +197,7 @@ class BodyWork(NamedTuple):
     terms: I1  # (B,)
     g: F1  # pooled; G_j: six symmetric rows of n, three axial ones; in the plane two and one
     l: F1  # pooled; three rows of n, integral of u_dot x phi_j dm; in the plane one  # noqa: E741
-    sorted: F1  # scratch of products: q, q_dot and sums by family; in the plane, undeformed moments
+    sorted: F1  # scratch of products: sums, q and q_dot by family; in the plane, undeformed moments
     H: F1  # (3 E,) the axial rows of G_j
     # (B, 6, 6) Cholesky factor of the Schur complement, reciprocal diagonal; with s and J it is constant for a rigid body,
     # and not positive in [0, 0] where that has none
