@@ -112,13 +112,21 @@ def table(times: Array, values: Array) -> TimeFunction:
 
 
 def piecewise(breaks: Array, coefficients: Array) -> TimeFunction:
-    """Piecewise polynomial: coefficients (pieces, k), ascending powers of (t - start of the piece).
+    """Piecewise polynomial: coefficients (pieces, k), ascending powers of (t - start of the piece), between breaks (pieces + 1,).
+
+    Raises InputError for other shapes, breaks that do not increase, and numbers that are not finite.
 
     >>> ramp = fd.piecewise(np.array([0.0, 1.0, 2.0]), np.array([[0.0, 1.0], [1.0, 0.0]]))
     """
-    pieces, count = np.shape(coefficients)
+    shape, steps = np.shape(coefficients), np.diff(np.asarray(breaks, float))
+    if len(shape) != 2 or steps.shape != shape[:1] or not (steps > 0).all():
+        raise InputError(
+            f"a piecewise polynomial needs a row of coefficients for each piece and breaks, one more, that increase; here are "
+            f"{np.size(breaks)} breaks and coefficients of shape {shape}. For values at times, use `held` or a table"
+        )
     return TimeFunction(
-        PIECEWISE, (float(pieces), float(count), *map(float, breaks), *map(float, np.ravel(coefficients)))
+        PIECEWISE,
+        (float(shape[0]), float(shape[1]), *_numbers("piecewise polynomial", (*breaks, *np.ravel(coefficients)))),
     )
 
 
