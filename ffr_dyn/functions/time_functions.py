@@ -112,7 +112,7 @@ def table(times: Array, values: Array) -> TimeFunction:
 
 
 def piecewise(breaks: Array, coefficients: Array) -> TimeFunction:
-    """Piecewise polynomial: coefficients (pieces, k), ascending powers of (t - start of the piece), between breaks (pieces + 1,).
+    """Piecewise polynomial between breaks (pieces + 1,); coefficients (pieces, k) of the powers of t less the piece's start.
 
     Raises InputError for other shapes, breaks that do not increase, and numbers that are not finite.
 
@@ -121,8 +121,8 @@ def piecewise(breaks: Array, coefficients: Array) -> TimeFunction:
     shape, steps = np.shape(coefficients), np.diff(np.asarray(breaks, float))
     if len(shape) != 2 or steps.shape != shape[:1] or not (steps > 0).all():
         raise InputError(
-            f"a piecewise polynomial needs a row of coefficients for each piece and breaks, one more, that increase; here are "
-            f"{np.size(breaks)} breaks and coefficients of shape {shape}. For values at times, use `held` or a table"
+            f"a piecewise polynomial needs coefficients (pieces, k) and increasing breaks (pieces + 1,); here are {shape} "
+            f"coefficients and {np.size(breaks)} breaks. For values at times use `table`"
         )
     return TimeFunction(
         PIECEWISE,

@@ -32,6 +32,7 @@ from ffr_dyn.analyses.registry import OverTime, analyses, analysis
 from ffr_dyn.analyses.settings import settings_of
 from ffr_dyn.functions.curves import Curve
 from ffr_dyn.integrators import CONTROLLED, METHODS, methods
+from ffr_dyn.integrators.stabilisation import Projection
 from ffr_dyn.scene import fields as said
 from ffr_dyn.scene import forces as _known_forces  # noqa: F401 - which makes them known
 from ffr_dyn.scene.couplings import Coupling
@@ -341,7 +342,7 @@ class StabilisationEntry(Strict):
     """
 
     kind: Literal["projection", "baumgarte", "none"] = "projection"
-    tolerance: Annotated[float, In("m or rad or 1"), Key(gt=0)] = 1e-9
+    tolerance: Annotated[float, In("m or rad or 1"), Key(gt=0)] = Projection().tolerance
     alpha: Annotated[float, In("1/s"), Key(gt=0)] | None = None
     beta: Annotated[float, In("1/s"), Key(gt=0)] | None = None
 

@@ -144,7 +144,7 @@ def _across(scene: Scene, normal: int) -> Iterator[str]:
     for body in scene.bodies:
         k = body_normal(body, normal)
         if k < 0:
-            yield f"no axis of body {body.name!r} is along it"
+            yield f"no axis of the frame of body {body.name!r} is along it"
         elif body.velocity.any() and abs(body.velocity[normal]) > _NOTHING * np.linalg.norm(body.velocity):
             yield f"body {body.name!r} starts with a velocity along it"
         elif not body.omega_bar.any():
@@ -194,7 +194,7 @@ def _found_asymmetry(part: Body, k: int, used: tuple[str, ...]) -> str:
     places = {"its centre of mass": body.centre_of_mass[k]} | {name: body.interface(name).position[k] for name in used}
     off = max(places, key=lambda name: abs(places[name]))
     if abs(places[off]) > BESIDE * length:
-        return f"{off} is {places[off]:.3g} m beside its middle plane"
+        return f"{off} is {abs(places[off]):.3g} m off the plane through the origin of its frame"
     products = max(abs(body.rr_dm[k, c]) for c in range(3) if c != k) / (body.mass * length**2)
     if products > BESIDE:
         return f"a product of inertia is {products:.2g} of its moments"
