@@ -34,7 +34,7 @@ Example:
   ffr-dyn stress out/result.nc -o out/stress
 
 \b
-A small scene, swing.toml; docs/scene_file.md has every entry, docs/first_steps.md the way from a STEP file to a film:
+A small scene, swing.toml; `ffr-dyn schema` has every entry:
   gravity = [0, -9.81, 0]
   [analysis]
   end = 0.5                                # [s]

@@ -36,7 +36,11 @@ Measures:
   rod.tip.velocity.x               any quantity of the scene (ffr-dyn info RESULT lists them)
 
 \b
-Terms that --drop leaves out: I3 I4 I5 I8 I9 (inertia integrals) and stiffening; docs/chart.md says what they do.
+Terms that --drop leaves out:
+  I3, I4        coupling of the modes with translation and rotation of the body; only both together
+  I5            coupling of the modes among themselves by rotation: Coriolis forces
+  I8, I9        change of inertia and centrifugal force, linear and quadratic in the deformation
+  stiffening    displacements of second order: geometric stiffening and foreshortening
 """
 
 

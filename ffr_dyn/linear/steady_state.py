@@ -356,11 +356,11 @@ def _phases(machine: Machine) -> tuple[float, ...]:
 
 
 def _varies(varying: float, rate: float) -> str:
-    of_modes = "its modes are those of what varies" if rate else "its modes have those means, too"
+    of_modes = "The modes take account of the change" if rate else "The modes are found for the mean, too"
     return (
-        "what acts on the turning bodies changes with their angle, as weight, loads and bearings do that are not the same "
-        f"all around, by up to {varying:.1g} of the stiffness or the forces: the steady motion has the means of a turn, "
-        f"{of_modes}; `periodic` finds the motion itself"
+        "the stiffness of the supports or the forces change with the angle of the turning bodies, by up to "
+        f"{varying:.1g} of their size. Bearings that are not isotropic, weight across the axis and loads of fixed direction "
+        f"do so. The steady motion is found for the mean over a turn. {of_modes}; `periodic` finds the motion itself"
     )
 
 

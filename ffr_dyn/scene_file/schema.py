@@ -392,7 +392,7 @@ class _Moment(Strict):
 class _Integrated(_Span):
     """A run by a method with steps.
 
-    method : integrator, by its name: docs/integrators.md tells which serves
+    method : integrator, by its name: `ffr-dyn methods` lists them
     step : [s] of a method with steps of one length; default: found, so that the accuracy is kept
     accuracy : relative error that the found step keeps [-]; default: 1e-3
     tolerances : of a method that chooses its steps

@@ -32,7 +32,7 @@ SOLVER = bundle(
         type=click.Choice(["cholesky", "superlu", "pardiso", "slepc"]),
         default="cholesky",
         show_default=True,
-        help="What factorises and finds modes: docs/size.md tells when another than our own serves.",
+        help="What factorises and finds modes; slepc shares millions of unknowns among machines.",
     ),
     click.option("--ranks", type=int, default=1, show_default=True, help="MPI processes of the solver slepc."),
     click.option(

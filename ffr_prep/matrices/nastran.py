@@ -173,7 +173,7 @@ def _reading(path: Path) -> Iterator[None]:
     except ImportError:
         raise InputError(
             "reading Nastran matrices needs pyNastran, which is not installed: pip install 'ffr[nastran]' (it may need "
-            "NumPy 1.26), or convert them to .npz (docs/matrices.md shows how)"
+            "NumPy 1.26), or write K and M to .npz elsewhere, by pyNastran and scipy.sparse.save_npz"
         ) from None
     except Exception as error:  # the reader raises whatever its parsers meet
         raise InputError(f"pyNastran cannot read {path} ({type(error).__name__}: {error})") from None

@@ -27,18 +27,18 @@ _SPRINGS = ("springs and dashpots", "between interfaces they are [springs] and [
 _MASSES = ("masses", "at an interface they are a rigid body of a scene on a fixed joint; otherwise change a density")
 _BEAMS = (
     "beams, bars and rods",
-    "only solids are reduced; a structure file joins them with solids (docs/structural.md)",
+    "only solids are reduced; a structure file joins them with solids (ffr-prep reduce-structure)",
 )
 _SHELLS = (
     "shells and membranes",
-    "they serve as faces, without stiffness and mass; a structure file joins them with solids (docs/structural.md)",
+    "they serve as faces, without stiffness and mass; a structure file joins them with solids (ffr-prep reduce-structure)",
 )
 _RIGID = ("rigid and averaging connections", "make their nodes an interface, rigid or mean")
 _JOINED = ("connections of parts", "let the parts share nodes, or join them as parts of a structure file")
 _SUPPORTS = ("supports", "they are joints of a scene; --reference says how the body is held for its modes")
 _LOADS = ("loads", "they belong to a scene")
-_DAMPING = ("damping", "give it by --rayleigh, --loss-factor or --damping (docs/materials.md)")
-_MATRICES = ("matrices", "take K and M of the whole model: ffr-prep reduce-matrices (docs/matrices.md)")
+_DAMPING = ("damping", "give it by --rayleigh, --loss-factor or --damping")
+_MATRICES = ("matrices", "take K and M of the whole model: ffr-prep reduce-matrices")
 
 # Keywords with their star, types of elements without.
 _ABAQUS = (

@@ -7,17 +7,21 @@ import re
 import runpy
 import sys
 from dataclasses import replace
+from pathlib import Path
 
+import click
 import numpy as np
 import pytest
 from places import ROOT
 from synthetic import cloud
 from test_dyn_stress import random_surface
 
+from ffr_dyn.cli import cli as dyn_cli
 from ffr_dyn.results.file import load_result
 from ffr_dyn.results.quantities import DEFAULT_OUTPUTS
 from ffr_dyn.scene_file.read import load_scene
 from ffr_prep.body import load_body, save_body
+from ffr_prep.cli import cli as prep_cli
 
 DOORS = ("ffr_prep", "ffr_dyn")
 ROOMS = ("docs", "docs/tutorials", "docs/howto")
@@ -44,6 +48,56 @@ def test_programs_use_the_front_doors_alone(page):
     ]
     assert [name for name in named if name.partition(".")[0] in DOORS and name not in DOORS] == []
     assert [node for node in imports if isinstance(node, ast.ImportFrom) and node.module in DOORS] == []
+
+
+SITE = [f"docs/{path.relative_to(ROOT / 'docs')}" for path in sorted((ROOT / "docs").rglob("*.md"))]
+WRITTEN = [page for page in SITE if not page.startswith(("docs/made/", "docs/gallery/"))]
+
+
+@pytest.mark.parametrize("page", WRITTEN)
+def test_links_are_called_by_what_they_lead_to(page):
+    """The site has titles, no files."""
+    text = re.sub(r"^```.*?^```", "", (ROOT / page).read_text(encoding="utf-8"), flags=re.S | re.M)
+    assert re.findall(r"\[[^\]]*\.md`?\]\([^)]*\)", text) == []
+    assert re.findall(r"docs/\w+\.md|[Tt]he site's page", text) == []
+
+
+def anchors(page: Path) -> set[str]:
+    """What myst makes of the headings of a page."""
+    text = re.sub(r"^```.*?^```", "", page.read_text(encoding="utf-8"), flags=re.S | re.M)
+    headings = re.findall(r"^#+ (.*)$", text, re.M)
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
+@pytest.mark.parametrize("page", WRITTEN)
+def test_links_to_sections_of_other_pages_find_them(page):
+    text = (ROOT / page).read_text(encoding="utf-8")
+    for path, anchor in re.findall(r"\]\(([\w./]+\.md)#([^)]+)\)", text):
+        assert anchor in anchors((ROOT / page).parent / path), f"{path}#{anchor}"
+
+
+def printed(path: Path) -> list[str]:
+    """Texts of a module that are no docstring."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    documented = (ast.Module, ast.ClassDef, ast.FunctionDef)
+    docstrings = {ast.get_docstring(node, clean=False) for node in ast.walk(tree) if isinstance(node, documented)}
+    constants = [node.value for node in ast.walk(tree) if isinstance(node, ast.Constant)]
+    return [value for value in constants if isinstance(value, str) and value not in docstrings]
+
+
+def helps(group: click.Group, name: str) -> list[str]:
+    context = click.Context(group, info_name=name)
+    commands = [group.get_command(context, word) for word in group.list_commands(context)]
+    return [group.get_help(context), *(of.get_help(click.Context(of)) for of in commands if of)]
+
+
+def test_what_is_printed_names_no_page_by_its_file():
+    """Who has installed the package has no folder of pages."""
+    modules = [path for package in DOORS for path in sorted((ROOT / package).rglob("*.py"))]
+    texts = [text for path in modules for text in printed(path)]
+    texts += helps(dyn_cli, "ffr-dyn") + helps(prep_cli, "ffr-prep")
+    texts.append((ROOT / "docs" / "scene.schema.json").read_text(encoding="utf-8"))
+    assert [text for text in texts if re.search(r"docs/\w+\.md", text)] == []
 
 
 def test_the_scene_file_of_the_documentation_is_valid(tmp_path):

@@ -9,7 +9,7 @@ is 0.13 mm elsewhere.
 
 Source: Exudyn 1.13.6 (J. Gerstmayr, Multibody System Dynamics 2023), run on 23 November 2026 by
 `benchmarks/against_exudyn.py`: generalised-alpha method, extrapolated from steps of 20 and 10 microseconds. Which is
-faster, and where: `docs/speed.md`.
+faster, and where: the page on speed.
 """
 
 import matplotlib.pyplot as plt

@@ -97,10 +97,11 @@ def campbell(
     turn   : what has the speed, as of `steady`;  orders : multiples of the speed that excite;  modes : how many, from the
              slowest at the first speed
 
-    The result has `speed` [rad/s], and of each vibration `frequencies` [Hz] in the turning axes, `seen` [Hz] from the ground,
-    positive where the whirl is forward, `damping_ratios` and `growth` [1/s]. Its attributes have the `names` of the
-    vibrations; `critical`, a list of {speed, order, mode, axes}, where a frequency crosses an order: from the ground of what
-    whirls, in the turning axes of what does not; and `limits`, a list of {speed, mode}, where one begins to grow.
+    The result has `speed` [rad/s], and of each vibration `frequencies` [Hz] in the turning axes and `seen` [Hz] from the
+    ground, positive where the whirl is forward, both of the damped vibration; `damping_ratios` and `growth` [1/s]. Its
+    attributes have the `names` of the vibrations; `critical`, a list of {speed, order, mode, axes}, where a frequency crosses
+    an order: from the ground of what whirls, in the turning axes of what does not; and `limits`, a list of {speed, mode},
+    where one begins to grow. A crossing is a resonance only if a force of that order excites the mode.
 
         found = fd.campbell(scene, speeds=np.linspace(0, 500, 21))
         fd.draw_campbell(found, "campbell.png")

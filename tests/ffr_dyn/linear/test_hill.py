@@ -48,7 +48,7 @@ def test_a_rotor_in_unlike_bearings_whirls_as_in_axes_at_rest(speed):
     np.testing.assert_allclose(2 * np.pi * np.abs(found.seen[moving][order]), exact.imag, rtol=1e-9)
     np.testing.assert_allclose(found.eigenvalues.real[moving][order], exact.real, rtol=1e-7)
     np.testing.assert_allclose(found.whirl[moving], 1.0, atol=1e-6)  # one frequency each, from the ground
-    assert "its modes are those of what varies" in found.notes[-1]
+    assert "The modes take account of the change" in found.notes[-1]
 
 
 def test_along_the_axis_nothing_is_added_to_a_frequency():
@@ -94,4 +94,4 @@ def test_the_damping_of_a_whirl_is_that_at_the_frequency_seen_from_the_ground():
     ratios = [-value.real / abs(value) for value in at_rest(200.0, 300.0)]
     whirling = np.array(found.attributes["whirling"], bool)
     np.testing.assert_allclose(np.sort(found["damping_ratios"][0, whirling]), np.sort(ratios), rtol=1e-6)
-    assert sum("changes with their angle" in note for note in found.attributes["notes"]) == 1
+    assert sum("mean over a turn" in note for note in found.attributes["notes"]) == 1

@@ -111,7 +111,7 @@ def test_weight_across_the_axis_is_taken_as_its_mean():
     scene = rotor(200.0, stiffening=True)
     plain = fd.steady(scene)["rod.q"]
     heavy = fd.steady(replace(scene, gravity=(0, -9.81, 0)))
-    assert "means of a turn" in heavy.attributes["notes"][-1]
+    assert "mean over a turn" in heavy.attributes["notes"][-1]
     np.testing.assert_allclose(heavy["rod.q"], plain, atol=1e-9 * np.abs(plain).max())
 
 
