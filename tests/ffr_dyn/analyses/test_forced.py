@@ -168,7 +168,7 @@ def test_the_command_draws_and_a_file_holds_it(tmp_path):
     assert done.exit_code == 0, done.output
     assert "output       hinge.angle: at most " in done.output
     assert picture.exists()
-    found = fd.load_result(tmp_path / "rod.nc")
+    found = fd.load_result(tmp_path / "rod.forced.nc")
     assert found["frequency"][0] == pytest.approx(0.7)
     text = file.read_text().replace('[analysis]\nend = 0.5\noutput_step = 0.05\nstep = 0.005\nmethod = "rk4"\n', "")
     keys = 'kind = "forced"\ninput = "hinge.moment"\namplitude = 2.0\nquantities = ["hinge.angle"]\nband = "0.5..0.7"\n'

@@ -305,7 +305,7 @@ def test_commands(tmp_path, words, said):
     done = CliRunner().invoke(cli, [given[0], str(file), *given[1:]], catch_exceptions=False)
     assert said in done.output
     assert done.exit_code == 0
-    assert (tmp_path / "rod.nc").exists()
+    assert (tmp_path / f"rod.{words[0]}.nc").exists()
     assert picture.exists() == ("PICTURE" in words)
 
 
@@ -316,7 +316,7 @@ def test_a_mode_is_drawn_and_all_are_in_the_file(tmp_path):
     done = CliRunner().invoke(cli, [*words, "1"], catch_exceptions=False)
     assert done.exit_code == 0, done.output
     assert film.stat().st_size > 1000
-    kept = fd.load_result(tmp_path / "rod.nc")
+    kept = fd.load_result(tmp_path / "rod.linearise.nc")
     assert kept.quantities["modes"].axes[0].labels[:4] == ("rod x", "rod y", "rod z", "rod turn x")
     np.testing.assert_allclose(np.abs(kept["modes"][0] @ [1, 1j]).max(axis=0), 1.0)
     with pytest.raises(fd.InputError, match=r"mode 9: the modes that are told are 1 to 1"):
