@@ -160,7 +160,10 @@ def without_empty_rows(model: MatrixModel) -> MatrixModel:
     groups = {name: new[of][new[of] >= 0] for name, of in model.groups.items()}
     if model.triangles is not None and (new[model.triangles] < 0).any():
         lost = int(model.triangles[new[model.triangles] < 0][0])
-        raise InputError(f"the surface has {node_in_words(model, lost)}, which has no row in the matrices")
+        raise InputError(
+            f"the surface has {node_in_words(model, lost)}, which has no row in the matrices: leave its triangles out, or "
+            "give the matrices of all its nodes"
+        )
     return MatrixModel(
         points=model.points[used],
         K=sp.csr_array(model.K[kept][:, kept]),

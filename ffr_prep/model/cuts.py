@@ -193,9 +193,6 @@ def _check(division: Division) -> None:
     for k, l in combinations(range(len(division.nodes)), 2):  # noqa: E741
         if l > k + 1 and np.intersect1d(division.nodes[k], division.nodes[l]).size:
             raise InputError(f"parts {k + 1} and {l + 1} touch each other: cut into fewer parts, or with other planes")
-    for k, (one, other) in enumerate(pairwise(division.shared), 2):
-        if np.intersect1d(one, other).size:
-            raise InputError(f"part {k} is so short that its two cuts share nodes: cut into fewer parts")
 
 
 # ---- interfaces ---------------------------------------------------------------------------------------------------

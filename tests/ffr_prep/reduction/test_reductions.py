@@ -390,11 +390,6 @@ def test_more_interface_modes_than_there_are(model, body):
         CharacteristicModes(2, 7).basis(model, body, functionals(MeanAxis(), model))
 
 
-def test_a_model_without_inertial_loads(model, body):
-    with pytest.raises(InputError, match="does not know its inertial loads"):
-        InertiaRelief().basis(replace(model, inertial_loads=None), body, functionals(MeanAxis(), model))
-
-
 def test_krylov_at_a_natural_frequency_is_refused():
     model = coupled(box_mesh("hex8", SIZE, (3, 1, 1)))
     body = factorised(model)
