@@ -150,9 +150,9 @@ def jumped(system: System, time: float, x: Array, sizes: Array, found: Equilibri
         grown, reached = _followed(problem, small, UNLOADED, 1.0)
     if reached < 1.0:
         return (
-            f"loads that grow find no equilibrium near the last one beyond {reached:.3g} of their size: there the scene jumps, "
-            "or a force has a pole, and the equilibrium found is on another branch; look at smaller loads, or run forward "
-            "with damping"
+            f"loads that grow find no equilibrium near the last one beyond {reached:.3g} of their size: there the scene "
+            "jumps, or a force has a pole, and the equilibrium found is on another branch; look at smaller loads, or run "
+            "forward with damping"
         )
     if _apart(problem, grown.path[-1], found.path[-1]) <= SAME * max(far, SAME):
         return ""

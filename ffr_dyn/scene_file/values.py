@@ -23,9 +23,10 @@ from pydantic_core import CoreSchema, core_schema
 
 from ffr_dyn.functions.curves import Curve
 from ffr_dyn.functions.formula import Expression, is_constant, parse
+from ffr_dyn.functions.quantities import WithUnit
 from ffr_dyn.functions.time_functions import HARMONIC, TimeFunction, constant, harmonic, piecewise, polynomial, table
 from ffr_dyn.scene.fields import Six, Unit
-from ffr_dyn.scene_file.parameters import WithUnit, as_number, fitting
+from ffr_dyn.scene_file.parameters import as_number, fitting
 from ffr_prep.common.errors import InputError
 from ffr_prep.common.reading import reading
 from ffr_prep.common.strict import Strict
@@ -180,6 +181,8 @@ def check_units(given: Iterable[tuple[Any, str]], info: ValidationInfo) -> None:
             fitting(text, unit)
         elif isinstance(text, str) and (split_quantity(text) or isinstance(parameters.get(text.strip()), WithUnit)):
             as_number(text, parameters, "it", unit)
+        elif isinstance(text, str):
+            parse(text, parameters, "it", unit)
 
 
 def _of_function(value: Any, unit: str) -> Iterator[tuple[Any, str]]:
