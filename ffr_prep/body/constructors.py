@@ -42,6 +42,8 @@ def rigid_body(
         raise BodyError(
             f"body {name!r}: mass {mass:g} kg, inertia and centre of mass must be finite; give them in SI units"
         )
+    for key, at in (points or {}).items():
+        check_point(f"body {name!r}: point", key, at)
     about_origin = tensor + mass * (c @ c * np.eye(3) - np.outer(c, c))
     nothing = np.zeros((3, 0))
     return FlexibleBody(
@@ -57,6 +59,16 @@ def rigid_body(
         surface=surface,
         provenance={"kind": "rigid"},
     )
+
+
+def check_point(what: str, name: str, at: ArrayLike) -> None:
+    """BodyError for a point whose name no quantity could carry, or that is so far away that products of lengths overflow."""
+    if not name or "." in name or not name.isprintable():
+        raise BodyError(
+            f"{what} {name!r} cannot be called so: a name has no dot and no line break, and a letter at least"
+        )
+    if not np.abs(np.asarray(at, float)).max() < _MOST:
+        raise BodyError(f"{what} {name!r} is at {np.asarray(at, float).tolist()} m: coordinates are below {_MOST:g} m")
 
 
 def truncated(body: FlexibleBody, modes: int | Array) -> FlexibleBody:

@@ -263,9 +263,9 @@ def _check_shapes(model: MatrixModel) -> None:
             )
         if not np.isfinite(A.data).all():
             raise InputError(f"{name} holds values that are not finite numbers")
-    if not np.isfinite(model.points).all():
-        wrong = int(np.flatnonzero(~np.isfinite(model.points).all(axis=1))[0])
-        raise InputError(f"node {model.labels[wrong]} has coordinates that are not finite numbers")
+    if not np.abs(model.points).max(initial=0.0) < _FAR:
+        wrong = int(np.flatnonzero(~(np.abs(model.points) < _FAR).all(axis=1))[0])
+        raise InputError(f"node {model.labels[wrong]} has coordinates that are not finite numbers, below {_FAR:g} m")
     if model.labels.shape != (len(model.points),):
         raise InputError(f"there are {len(model.points)} nodes, but {np.size(model.labels)} labels for them")
 

@@ -130,6 +130,9 @@ def divided(
     Raises InputError for planes that leave a part without elements or in several pieces, for parts that do not follow one
     another, and for interfaces called like those of a cut.
     """
+    count = sum(map(len, blocks))
+    if isinstance(cuts, int) and cuts > count:
+        raise InputError(f"parts = {cuts}: the model has {count} elements, and each part one at least; ask for fewer")
     planes = planes_of(cuts, points)
     centres = np.concatenate([points[nodes].mean(axis=1) for nodes in blocks])
     beyond = [(centres - plane.point) @ np.asarray(plane.normal) > 0 for plane in planes]

@@ -11,6 +11,7 @@ from mutated_inputs import STRUCTURE
 from prep_remedy import command, with_files, words
 from said import Case
 
+from ffr_prep.body import load_body
 from ffr_prep.common.hdf5 import check_heaps
 from ffr_prep.common.outputs import replacing
 from ffr_prep.common.reading import check_count, read_text, read_toml, reading
@@ -95,6 +96,16 @@ def registered(*settings: Setting, name: str = "other") -> object:
 
     registry = Registry("entry", (Entry("one", (Setting("count", int, 1, "How many."),)),))
     return registry.register(Entry(name, settings))
+
+
+def piped(path: Path) -> object:
+    """A body that is a pipe, which nobody writes to."""
+
+    def act() -> object:
+        os.mkfifo(path)
+        return load_body(path)
+
+    return with_files(act, {})
 
 
 def linked(name: str) -> object:
@@ -207,6 +218,16 @@ FILES = [
     words("export body.ffr -o new.xyz", "export body.ffr -o new.sid"),
     words("info body.ffr --terms I10", "info body.ffr --terms I1"),
     reduces("--stiffening", "--linear"),
+    words("reduce block.inp --linear --interface LEFT -o -", REDUCE),
+    words("modes body.ffr -o block.inp/out", "info body.ffr"),
+    words(
+        "reduce-structure s.toml -o new.ffr -p nodes.tip.1=1 -p nodes.tip.1=1",
+        "reduce-structure s.toml -o new.ffr -p nodes.tip.1=1",
+        s_toml=STRUCTURE,
+    ),
+    words("mesh end.geo --size 1 --order 1", "mesh part.geo --size 1 --order 1", end_geo="Exit;\n"),
+    reduces("--parts 3", "--modes 0 --parts 2"),
+    Case(lambda: piped(Path("pipe.ffr")), lambda: with_files(lambda: load_body("body.ffr"), {})),
     Case(lambda: unwritable(REDUCE), lambda: command(REDUCE)),
     Case(lambda: written(failing=True), written),
     Case(lambda: written(twice=True), written),

@@ -217,6 +217,10 @@ def rigid(mass: float = 1.0, inertia: object = (1, 1, 1)) -> fp.FlexibleBody:
     return fp.rigid_body("a", mass=mass, inertia=inertia)
 
 
+def pointed(name: str = "a", x: float = 0.0) -> fp.FlexibleBody:
+    return fp.rigid_body("a", mass=1.0, inertia=(1, 1, 1), points={name: (x, 0, 0)})
+
+
 def damping(**how: object) -> fp.FlexibleBody:
     return fp.damped(CLOUD, **how)
 
@@ -267,6 +271,8 @@ BODIES = [
     Case(p(rigid, 1.0, (1, 1)), rigid),
     Case(p(rigid, 1.0, (1, 1, 3)), rigid),
     Case(p(rigid, 1e308), rigid),
+    *(Case(p(pointed, name), pointed) for name in ("", "a.b", "a\nb")),
+    Case(p(pointed, x=1e200), pointed),
     Case(p(fp.truncated, CLOUD, 4), p(fp.truncated, CLOUD, 3)),
     Case(p(fp.truncated, CLOUD, [0, 0]), p(fp.truncated, CLOUD, [0, 1])),
     Case(p(fp.with_point, rigid(), "a", (0, 0, 0)), p(fp.with_point, PLATE, "a", (0, 0, 0))),
