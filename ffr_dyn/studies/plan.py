@@ -25,6 +25,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 import re
 import shlex
 from collections.abc import Iterator, Mapping, Sequence
@@ -199,16 +200,16 @@ def _says_values(table: Mapping[str, Any]) -> bool:
 
 
 def _are_numbers(given: Sequence[Any]) -> bool:
-    return all(isinstance(one, (int, float)) and not isinstance(one, bool) for one in given)
+    return all(isinstance(one, (int, float)) and not isinstance(one, bool) and abs(one) < math.inf for one in given)
 
 
 def _values(name: str, given: Any) -> Axis | Spread:
     """What a parameter takes. Raises InputError for what says no values."""
     if isinstance(given, (Axis, Spread)):
         return given
-    if isinstance(given, (int, float, str)) and not isinstance(given, bool):
+    if isinstance(given, str) or _are_numbers([given]):
         return Axis((given,))
-    if isinstance(given, (list, tuple)) and given and all(isinstance(one, (int, float, str)) for one in given):
+    if isinstance(given, (list, tuple)) and given and all(isinstance(one, str) or _are_numbers([one]) for one in given):
         return Axis(tuple(given))
     if isinstance(given, Mapping) and {"from", "to", "count"} <= given.keys() <= {"from", "to", "count", "spacing"}:
         return _range(name, given)

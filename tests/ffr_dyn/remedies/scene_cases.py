@@ -102,6 +102,7 @@ SCENES = [
         {"position": (1e200, 0, 0)}, {"velocity": (np.nan, 0, 0)}, {"omega_bar": (0, 0, 1e300)},
         {"rotation": (1e300, 0, 0)}, {"rotation": (1e7, 0, 0)})),
     Case(lambda: replace(HINGED, gravity=(0, 1e300, 0)), lambda: replace(HINGED, gravity=(0, -9.81, 0))),
+    Case(p(Coupling, "c", "hinge0.angle", "hinge0.angle", 2.0), p(geared, 2.0)),
     Case(p(run, HINGED, end=1e9), p(run, HINGED, end=0.01)),
     Case(p(slim, 0.0), p(slim, 0.1)),
 ]  # fmt: skip

@@ -99,6 +99,7 @@ CASES = [
     Case(asked({"g": {"from": 1, "to": 2, "count": 3, "spacing": "even"}}),
          asked({"g": {"from": 1, "to": 2, "count": 3, "spacing": "log"}})),
     Case(asked({"g": {"from": "a", "to": 2, "count": 3}}), asked({"g": {"from": 1, "to": 2, "count": 3}})),
+    *(Case(asked({"g": wrong}), asked(G)) for wrong in (np.nan, [1.0, np.inf], {"from": 1, "to": np.nan, "count": 3})),
     Case(asked({"g h": [1]}), asked(G)),
     Case(asked({"gg": [1]}), asked(G)),
     Case(asked({**G, "idle": [1]}), asked(G)),
