@@ -70,7 +70,7 @@ class SetUpError(Exception):
 
 @dataclass(frozen=True)
 class Stamp:
-    """What an environment was made for: the folder, the contents of pyproject.toml, and the extras installed."""
+    """The stamp of an environment: the folder, the contents of pyproject.toml, and the extras installed."""
 
     home: str
     project: str

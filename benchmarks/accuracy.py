@@ -186,7 +186,7 @@ def line(name: str, found: Found) -> str:
 
 
 def report(method: str, cases: Sequence[Case], variant: str) -> str:
-    """What came out for each scene is printed; all of them in a line."""
+    """Print the outcome for each scene; returns that of all of them in a line."""
     print(f"\n{method}: told over true errors; true errors in thousandths of ranges; costs in final runs\n"
           f"{'scene':26}{'pairs':>6}{'in %':>8}{'low %':>7}{'least':>8}{'most':>8}{'places':>9}{'forces':>9}{'silent':>8}"
           f"{'cost':>7}{'extra':>7}")  # fmt: skip

@@ -1,4 +1,4 @@
-"""What vectors across scenes would bring: the factor and solution of a body's 6 x 6 matrix, scene by scene and eight at once.
+"""The gain of vectors across scenes: the factor and solution of a body's 6 x 6 matrix, scene by scene and eight at once.
 
     python -m benchmarks.across_scenes
 

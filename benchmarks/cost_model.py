@@ -89,7 +89,7 @@ def timed(scene: Scene, choice: Choice, span: Span) -> Timing:
 
 
 def features(choice: Choice) -> list[float]:
-    """What an evaluation consists of, in the order of the constants: in space, then in the plane, after the first."""
+    """The counts that make up an evaluation, in the order of the constants: in space, then in the plane, after the first."""
     found = np.zeros(7)
     for part in choice.parts:
         n = part.count

@@ -1,4 +1,4 @@
-"""What is raced over: a scene, its time, what is measured of its motion and how wrong that may be; the reference.
+"""The courses of the race: a scene, its time, the measure of its motion with the error allowed; the reference.
 
 The *elastic deflection* of a link is the offset of its middle from the chord between its ends, a vector. Its error is the
 largest over all links and output times, relative to the largest deflection of any link; the error of the tip is the largest

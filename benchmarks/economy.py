@@ -1,4 +1,4 @@
-"""What `economise` finds for the benchmark set, against an exhaustive grid of models and against everything.
+"""Models that `economise` finds for the benchmark set, against an exhaustive grid of models and against the full model.
 
     python -m benchmarks.economy [--no-grid | --statements] [--unseen] [case ...]
 
@@ -74,7 +74,7 @@ SHARP, LONG = 0.1, 3e8  # of a tolerance, to which the truth is wanted, and what
 
 @dataclass(frozen=True)
 class Row:
-    """What came out for a case and a tolerance; times [s] of processor."""
+    """The outcome for a case and a tolerance; times [s] of processor."""
 
     case: str
     tolerance: float
@@ -119,7 +119,7 @@ def truth(scene: Scene, found: list[Economy], span: Span) -> Known:
 
 @dataclass(frozen=True)
 class Statement:
-    """What is said of a model, and its true error, both in tolerances.
+    """The error told of a model, and its true error, both in tolerances.
 
     verified : None where no verification was asked for, else whether there is one
     """
@@ -401,7 +401,7 @@ HEAD = (
 
 
 def summary(rows: list[Row]) -> Iterator[str]:
-    """What is asked of the whole set, and what came out."""
+    """The goals for the whole set, and the outcome."""
     over = [row.chosen / row.grid for row in rows if np.isfinite(row.grid)]
     every = [(row, k, float(e)) for row in rows for k, e in enumerate(row.effectivity)]
     inside = [LOW <= e <= HIGH for _, _, e in every]

@@ -85,7 +85,7 @@ def fem_interface(meshed: MeshedBody) -> FEMinterface:
 
 
 def mass_terms(body: FlexibleBody) -> dict[str, Array]:
-    """What ObjectFFRFreducedOrder wants to know of the mass, from the inertia integrals of a body.
+    """The mass terms that ObjectFFRFreducedOrder asks for, from the inertia integrals of a body.
 
     With tilde(a) b = a x b:  tilde^T = -tilde, so mPsiTildePsi = -I5, mPsiTildePsiTilde = -I9, mXRefTildePsi = -I4 and
     mXRefTildePsiTilde = -I8; mPhitTPsi = I3, mPhitTPsiTilde = tilde(I3).

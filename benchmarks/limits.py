@@ -1,4 +1,4 @@
-"""What an evaluation costs, how that grows, what the linearly implicit methods take, and how long a first run takes.
+"""The cost of an evaluation, how that grows, what the linearly implicit methods take, and how long a first run takes.
 
     python -m benchmarks.limits [--quick]
 

@@ -1,4 +1,4 @@
-"""What a body tells of its mesh against the truth by a fine one: `python -m benchmarks.mesh_error`.
+"""The error of its mesh that a body tells, against the true one by a fine mesh: `python -m benchmarks.mesh_error`.
 
 For each mesh, how much higher its frequencies are than those of a fine one of second-order elements, number by number, and
 what the body says of them. Elements of first order may exchange modes: where the true number is odd, look at its neighbours.

@@ -1,4 +1,4 @@
-"""What Python costs around a run of milliseconds: assembling, tables and result of a slider-crank with a rod of 8 modes.
+"""Python's share around a run of milliseconds: assembling, tables and result of a slider-crank with a rod of 8 modes.
 
     python -m benchmarks.overhead [--runs 40]
 

@@ -1,4 +1,4 @@
-"""What bodies of `ffr_prep` reach against closed forms and independently computed motions.
+"""Accuracy of the bodies of `ffr_prep`: against closed forms and independently computed motions.
 
     python -m benchmarks.preparation
 
@@ -66,7 +66,7 @@ SPIN_UP = {5.0: -0.468476, 6.8: -0.573761, 10.0: -0.362815}
 
 @dataclass(frozen=True)
 class Figure:
-    """What was asked for, what was found, and the largest value that meets it (or the smallest, where `above`)."""
+    """A goal and the figure found: the largest value that meets it (or the smallest, where `above`)."""
 
     what: str
     found: float

@@ -62,7 +62,7 @@ TRIED = (
 
 @dataclass(frozen=True)
 class Entry:
-    """What a code comes with: words, how fine, the errors found, and the timed run."""
+    """The entry of a code in the race: words, how fine, the errors found, and the timed run."""
 
     words: str
     fineness: int

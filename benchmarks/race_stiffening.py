@@ -1,4 +1,4 @@
-"""What the second-order displacement of bodies costs per step, and what it gains: part of `benchmarks.race`, and by itself:
+"""The cost per step of the second-order displacement of bodies, and its gain: part of `benchmarks.race`, and by itself:
 
     python -m benchmarks.race_stiffening
 

@@ -1,4 +1,4 @@
-"""What mutated inputs, kills and full disks do: counts of outcomes.
+"""Mutated inputs, kills and full disks: counts of outcomes.
 
     python -m benchmarks.robustness [INPUTS [KILLS [DISKS]]]     # by default 100000, 200, 50
 

@@ -1,4 +1,4 @@
-"""What machines that rotate and vibrate reach: against beams in inertial axes, published rotors, closed forms and long runs.
+"""Accuracy of machines that rotate and vibrate: against beams in inertial axes, published rotors, closed forms and long runs.
 
     python -m benchmarks.rotating [case ...]
 

@@ -1,4 +1,4 @@
-"""What bodies with second-order displacement reach: against geometrically exact beams, and the laws that they must hold.
+"""Accuracy of second-order bodies: against geometrically exact beams, and the laws that they must hold.
 
     python -m benchmarks.second_order [case ...]
 

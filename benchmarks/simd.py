@@ -1,4 +1,4 @@
-"""What the vectors written by hand gain: whole runs with them, and with the plain numba that stands in for them.
+"""The gain of the vectors written by hand: whole runs with them, and with the plain numba that stands in for them.
 
     python -m benchmarks.simd [--rounds 5] [--quick] [--beside DIRECTORY]
 

@@ -1,4 +1,4 @@
-"""What implicit forces cost: processor time of a step of ROS2, with and without them, for chains of 32 links.
+"""The cost of implicit forces: processor time of a step of ROS2, with and without them, for chains of 32 links.
 
 A damper on every joint shares the block of its joint: goal, at most a quarter of a step (half a stage of two). Springs
 between the middles of neighbouring links and bushings in place of joints have blocks of their own. Beside them the same

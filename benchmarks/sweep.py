@@ -1,4 +1,4 @@
-"""What a study costs beyond its runs and its bodies, and whether kills change it.
+"""The cost of a study beyond its runs and its bodies, and whether kills change it.
 
     python -m benchmarks.sweep [RUNS [BODIES]]     # by default 1000 runs with 20 bodies; the goal speaks of 10000 with 200
 

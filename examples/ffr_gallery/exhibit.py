@@ -1,4 +1,4 @@
-"""What an exhibit of the gallery is: a method that fails where theory says it does, and a remedy that holds."""
+"""The exhibit of the gallery: a method that fails where theory says it does, and a remedy that holds."""
 
 from __future__ import annotations
 

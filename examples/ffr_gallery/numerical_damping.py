@@ -1,4 +1,4 @@
-"""What a linearly implicit method does to a mode, from those that the step resolves to those far beyond it."""
+"""Numerical damping of a linearly implicit method: from modes that the step resolves to those far beyond it."""
 
 from __future__ import annotations
 

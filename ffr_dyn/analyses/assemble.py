@@ -70,7 +70,7 @@ def assembly(
 
 
 def changes(assembled: Assembled) -> list[str]:
-    """What assembly changed of each body, in words; one line where it changed nothing."""
+    """The changes that assembly made to each body, in words; one line where it changed nothing."""
     scene, place = assembled.system.scene, assembled.system.layout
     x, v = initial_state(scene, place)
     found = []

@@ -1,4 +1,4 @@
-"""What a stopped run needs to go on as if it had never stopped: its state, all counters, and what it was a run of."""
+"""The checkpoint of a stopped run: its state, all counters, and the mark of the run that it belongs to."""
 
 from __future__ import annotations
 

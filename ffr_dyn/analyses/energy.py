@@ -56,7 +56,7 @@ class _Row:
 
 @dataclass
 class EnergyWatch:
-    """What the rows so far had to give.
+    """The account of the energy in the rows so far.
 
     spacing  : of the steps, or of the rows of a method that chooses its steps [s]
     complete : gives a record the reactions of redundant rows

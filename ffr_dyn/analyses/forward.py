@@ -115,7 +115,7 @@ class _Runs:
         return found
 
     def together(self, calls: Sequence[Callable[[Say], Any]], leader: bool) -> list[Any]:
-        """What runs return, or the exceptions that they raise; that of a leader, the first, ends the others and is raised.
+        """The results of the calls, or their exceptions; that of a leader, the first, ends the others and is raised.
 
         They go on at the same time, and progress is their mean; one after another beside a stopwatch, and with the user's
         Python functions, which would be called out of order.
@@ -270,7 +270,7 @@ def _with_twin(
 
 
 def _granted(outcome: Any) -> Any:
-    """What a call returned. Raises what it raised."""
+    """The result of a call. Raises the exception that it raised."""
     if isinstance(outcome, BaseException):
         raise outcome
     return outcome
@@ -293,8 +293,8 @@ def _told(trial: _Trial, other: Any, *longer: Any) -> _Trial:
 def _further(
     runs: _Runs, method: Any, count: int, earlier: Sequence[_Trial] = ()
 ) -> list[Callable[[Say], Beside | None]]:
-    """What tells the error of a run beside its twin: the run with another step, and, beside a twin of half the step, one with
-    a longer step; those of the last trial if its step is not too far."""
+    """The further runs that tell the error of a run beside its twin: one with another step, and, beside a twin of half the
+    step, one with a longer step; those of the last trial if its step is not too far."""
     near = next((one for one in reversed(earlier) if one.twins and count <= _leap(method) * one.count), None)
     if near is not None:
         ratio = count / near.count

@@ -65,8 +65,8 @@ _MOST_ROWS = 1e9  # each of hundreds of bytes at least
 
 @dataclass
 class _Run:
-    """What changes while a run goes on; `done` counts the steps. The first row is `unseen` until others can be looked at with
-    it."""
+    """The part of a run that changes while it goes on; `done` counts the steps. The first row is `unseen` until others can
+    be looked at with it."""
 
     engine: Engine
     energy: EnergyWatch
@@ -138,7 +138,7 @@ def integrate(
 
 
 def _kept(system: System, wanted: Mapping[str, Entry], rows: int) -> Kept:
-    """What a run of so many output rows keeps where no file is written and no event is looked for."""
+    """Memory for the quantities of a run of so many output rows that writes no file and looks for no event."""
     if needs_every_step(wanted) or rows * row_size(system) > SMALL:
         return Measured(system, wanted)
     return Recorded(system, wanted)
@@ -363,7 +363,7 @@ def _watcher(
     events: Sequence[Event],
     resume: str | Path | None,
 ) -> Watcher:
-    """What looks for events from where the run stands."""
+    """The search for events from where the run stands."""
     if resume is not None:
         raise InputError(
             "a run with events cannot be resumed: those of its first part are not in the file; run the whole"
@@ -429,7 +429,7 @@ def _arrays(engine: Engine, energy: EnergyWatch, seen: Seen) -> dict[str, Array]
 
 
 def _changing(engine: Engine) -> Iterator[tuple[str, Array]]:
-    """What of an engine's tables a run changes."""
+    """The tables of an engine that a run changes, by name."""
     for name in ("work", "stages", "clock", "control", "x", "v"):
         yield from leaves(getattr(engine.tables, name), name)
 
@@ -502,7 +502,7 @@ def _result(scene: Scene, run: _Run, attributes: dict[str, Any]) -> Result:
 
 
 def _account(run: _Run, notes: list[str]) -> dict[str, Any]:
-    """What only the end of a run can tell."""
+    """The attributes that only the end of a run can tell."""
     assembled = run.seen.assembled
     info, drift = run.engine.work.info, run.engine.work.drift
     return {

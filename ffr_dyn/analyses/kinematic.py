@@ -23,7 +23,7 @@ from ffr_dyn.consistency import doubts
 from ffr_dyn.consistency.assemble import Assembled, assemble
 from ffr_dyn.consistency.evaluation import Evaluation, Evaluator, copied, evaluate, evaluator, joined, total_mass_matrix
 from ffr_dyn.consistency.mobility import named_motion, require_driven
-from ffr_dyn.equations.layout import moved, to_global_axes
+from ffr_dyn.equations.layout import moved, to_body_axes, to_global_axes
 from ffr_dyn.kernels.tables import EVALUATIONS, Record
 from ffr_dyn.results.quantities import selected
 from ffr_dyn.results.result import Result
@@ -89,7 +89,9 @@ def kinematic(
     assembled = assemble(rigid, time=start)
     selected(assembled.system, outputs)
     at = evaluator(assembled.all_rows or assembled.system)
-    pose = _pose(at, start, assembled.x, assembled.v)
+    pose = replace(
+        _pose(at, start, assembled.x, assembled.v), v=to_body_axes(at.system.layout, assembled.x, assembled.v)
+    )
     poses, followed = [pose], [pose]
     for time in output_times(start, end, output_step)[1:]:
         followed += _follow(at, followed[-1], float(time), output_step)

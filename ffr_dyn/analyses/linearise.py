@@ -460,6 +460,6 @@ def _lines_of_modes(
 
 
 def _whirling(seen: float, share: float) -> str:
-    """What is told of a whirl; nothing of what does not turn, or moves to and fro."""
+    """The words for a whirl; empty for a mode that does not turn, or moves to and fro."""
     (way,) = ways_of(np.array([seen]), np.array([share]))
     return f"   {way} whirl, {abs(seen):.6g} Hz from the ground" if way else ""

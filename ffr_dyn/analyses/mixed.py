@@ -270,7 +270,7 @@ def _fitted(
 
 
 def _solution(own: ServoMotion, degree: int, w: Array, x: Array, wanted: Causal | Bounded | None) -> Causal | Bounded:
-    """What was asked for, or what the internal dynamics allow at the start; an error for a causal run they do not."""
+    """The solution that was asked for, or that the internal dynamics allow; an error for a causal run they do not."""
     if degree != AT_ONCE:
         if isinstance(wanted, Causal):
             raise InputError(

@@ -49,13 +49,13 @@ def result_of(
 
 
 def accompanying(scene: Scene) -> tuple[str, ...]:
-    """What goes with efforts in every result: the power of every driver, the rates of joint coordinates."""
+    """Quantities that accompany efforts in every result: the power of every driver, the rates of joint coordinates."""
     rates = [f"{joint.name}.{coordinate}_rate" for joint in scene.joints for coordinate in COORDINATES[joint.kind]]
     return (*(f"{driver.name}.power" for driver in scene.drivers), *rates)
 
 
 def needed(scene: Scene, outputs: Sequence[str]) -> tuple[str, ...]:
-    """What has to be computed for `outputs` and for the efforts, which come from default quantities."""
+    """The quantities that must be computed for `outputs` and for the efforts, which come from default quantities."""
     driven = {joint_of(scene, driver).i for driver in scene.drivers if isinstance(driver, Driver)}
     turned = (f"{marker}.orientation" for marker in sorted(driven) if not marker.startswith(f"{GROUND}."))
     return ("default", *accompanying(scene), *turned, *outputs)

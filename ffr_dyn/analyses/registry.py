@@ -1,4 +1,4 @@
-"""What an analysis declares, and the list of all: command line, scene files, schema and help are made from both.
+"""The declaration of an analysis, and the list of all: command line, scene files, schema and help are made from both.
 
 An analysis is a frozen dataclass in the file of its function (`Static` in `ffr_dyn.analyses.static`). Its fields are what the
 table [analysis] of a scene file may hold besides times and method; a field with an `option` is an option of the command, too.
@@ -69,7 +69,7 @@ class Analysis:
         raise NotImplementedError
 
     def report(self, result: Result) -> list[str]:
-        """What a command tells of the result, a line each."""
+        """The report of the result by a command, a line each."""
         return summary(result.attributes)
 
 
@@ -138,7 +138,7 @@ def analysis(word: str) -> type[Any]:
 
 
 def summary(attributes: Mapping[str, Any]) -> list[str]:
-    """What an analysis reports by its attributes, a line each."""
+    """The report of an analysis by its attributes, a line each."""
     a = attributes
     lines = [
         f"scene        {a['title']}: {a['analysis']}, {a['degrees_of_freedom']} degrees of freedom",

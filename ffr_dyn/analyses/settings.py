@@ -14,7 +14,7 @@ from ffr_dyn.integrators.stabilisation import Projection, Stabilisation
 
 @dataclass(frozen=True)
 class Charted:
-    """What `ffr-dyn chart` compares (docs/chart.md).
+    """The variants that `ffr-dyn chart` compares (docs/chart.md).
 
     measures : such as "deflection:rod"; () for those that fit the scene
     methods  : (name, steps [s] or tolerances), without numbers where a ladder is to be chosen; () for all methods

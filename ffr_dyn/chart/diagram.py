@@ -88,7 +88,7 @@ class Diagram(Brief):
         raise InputError(f"the diagram has no measure {name!r}; it has: {', '.join(m.name for m in self.measures)}")
 
     def scale(self, measure: str) -> float:
-        """What errors are relative to; 1 where only absolute ones make sense."""
+        """The scale to which errors are relative; 1 where only absolute ones make sense."""
         return self.reference.scales[measure] or 1.0
 
     def front(self, measure: str, cost: str) -> tuple[Point, ...]:

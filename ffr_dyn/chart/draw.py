@@ -142,7 +142,7 @@ def _scale_of_errors(axes: Axes, floor: float) -> None:
 
 
 def error_words(diagram: Diagram, measure: str) -> str:
-    """What the errors of a measure are, for an axis."""
+    """The label of an axis for the errors of a measure."""
     if diagram.reference.scales[measure]:
         return "largest error, relative"
     return f"largest value [{diagram.measure(measure).unit}]"

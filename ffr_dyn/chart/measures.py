@@ -1,4 +1,4 @@
-"""What a diagram compares: a measure picks a history out of a result and knows the scale of its errors.
+"""Measures that a diagram compares: each picks a history out of a result and knows the scale of its errors.
 
 As text (`measure_of`): "position:rod.tip", "deflection:rod" (everywhere), "deflection:rod.tip" (from the body's frame),
 "deflection:rod.mid/hinge,tip" (from the chord between two other points), "reaction:hinge", "moment:hinge",
@@ -26,7 +26,7 @@ PLACES = 48  # points of the surface at which the deflection of a whole body is 
 
 
 class Measure(Protocol):
-    """What the diagram needs of a measure."""
+    """The protocol of a measure of a diagram."""
 
     @property
     def name(self) -> str:
@@ -38,7 +38,7 @@ class Measure(Protocol):
 
     @property
     def words(self) -> str:
-        """What it is, for an axis."""
+        """Its label on an axis."""
 
     @property
     def outputs(self) -> tuple[str, ...]:
@@ -48,7 +48,7 @@ class Measure(Protocol):
         """(T, k) history."""
 
     def scale(self, result: Result) -> float:
-        """What an error of the history is small or large against, in its unit; of the reference."""
+        """The scale of errors of the history, in its unit; taken from the reference."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""What no other choice beats."""
+"""The Pareto front: choices that no other choice beats."""
 
 from __future__ import annotations
 

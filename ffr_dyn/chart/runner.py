@@ -181,7 +181,7 @@ def _clocked(scene: Scene, method: Any, job: Job, outputs: tuple[str, ...]) -> t
 
 
 class Pool(Protocol):
-    """What runs jobs."""
+    """The protocol of whatever runs jobs."""
 
     def results(self, function: Callable[[Item], Any], items: Sequence[Item]) -> Iterator[tuple[int, Any]]:
         """(number of the item, what the function returned or a `Failure`), in the order in which they are done."""
@@ -197,7 +197,7 @@ class Here:
 
 
 def tried(function: Callable[[Item], Any], item: Item) -> Any:
-    """What a function makes of an item, at the third attempt if need be, or a `Failure`."""
+    """The result of the function for an item, at the third attempt if need be, or a `Failure`."""
     for _ in range(RETRIES + 1):
         try:
             return function(item)
@@ -228,7 +228,7 @@ class Distributed:
 
 
 def _by_itself(function: Callable[[Item], Any], item: Item) -> Any:
-    """What a function makes of an item, with no threads: other workers take the other processors."""
+    """The result of the function for an item, with no threads: other workers take the other processors."""
     with alone():
         return function(item)
 

@@ -25,7 +25,7 @@ EXPLICIT_REACH = 1.5  # step times highest circular frequency of a body at which
 
 @dataclass(frozen=True)
 class Model:
-    """What is simplified in a scene: the arguments of `ffr_dyn.variants.variant.vary`, with the words for it.
+    """A simplification of a scene: the arguments of `ffr_dyn.variants.variant.vary`, with the words for it.
 
     >>> model = fd.Model("4 modes", modes=4, drop=("I9",))
     """
@@ -54,7 +54,7 @@ class Variant:
 
     @property
     def kind(self) -> str:
-        """What the number is: "step" or "tolerance"."""
+        """The meaning of the number: "step" or "tolerance"."""
         return TOLERANCE if self.method in CONTROLLED else STEP
 
     @property
@@ -69,7 +69,7 @@ class Variant:
 
 
 def maker(method: str) -> Callable[[float], Integrator]:
-    """What makes a method from its number. Raises InputError for an unknown one."""
+    """The constructor of a method from its number. Raises InputError for an unknown one."""
     kind = method_named(method)
     return (lambda relative: kind(tolerances(relative))) if kind.controlled else kind
 

@@ -119,7 +119,7 @@ def schema() -> None:
 @cli.command()
 @click.argument("result", type=INPUT_FILE)
 def info(result: Path) -> None:
-    """What RESULT holds: how it was made, notes, and every quantity with its unit."""
+    """Describe RESULT: how it was made, notes, and every quantity with its unit."""
     from ffr_dyn.results.file import load_result
 
     loaded = load_result(result)

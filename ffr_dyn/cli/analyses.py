@@ -46,7 +46,7 @@ Forces are written as
 @parameter_option
 @time_option
 def check(scene: Path, parameters: tuple[str, ...], time: float | None) -> None:
-    """What SCENE can do: degrees of freedom, free motions, redundant rows of joints, drivers that contradict."""
+    """Mobility of SCENE: degrees of freedom, free motions, redundant rows of joints, drivers that contradict."""
     from ffr_dyn.analyses.static import Static
     from ffr_dyn.consistency.mobility import mobility
     from ffr_dyn.scene_file.read import load_scene
@@ -133,7 +133,7 @@ def _is_force(made: Any, f: Field[Any]) -> bool:
 
 def _analyse(made: Any, scene: Path, given: Mapping[str, Any]) -> None:
     """Perform the analysis of a command on a scene file; its own settings of that analysis hold where no option is given."""
-    from ffr_dyn.analyses.registry import OverTime
+    from ffr_dyn.analyses.registry import OverTime, word_of
     from ffr_dyn.scene_file.read import load_scene
 
     loaded, settings = load_scene(scene, assignments(given["parameters"]))
@@ -145,7 +145,9 @@ def _analyse(made: Any, scene: Path, given: Mapping[str, Any]) -> None:
     else:
         found = at_moment(settings, analysis, given["time"], keep)
     changes = {key: given[key] for key in INTEGRATION if key in given}
-    perform(loaded, changed(found, changes), given["output"] or scene.with_suffix(".nc"), given.get("resume", False))
+    # A result of the file's own analysis, such as a long run, is not replaced by that of another.
+    ending = ".nc" if isinstance(settings.analysis, made) else f".{word_of(made)}.nc"
+    perform(loaded, changed(found, changes), given["output"] or scene.with_suffix(ending), given.get("resume", False))
 
 
 def _value(made: Any, f: Field[Any], given: Any) -> Any:

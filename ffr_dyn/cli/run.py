@@ -22,11 +22,10 @@ if TYPE_CHECKING:
     from ffr_dyn.scene.scene import Scene
 
 scene_argument = click.argument("scene", type=INPUT_FILE)
-output_option = click.option("-o", "--output", type=OUTPUT_FILE, help="Result file (netCDF); default: <scene>.nc.")
+_RESULT = "Result file (netCDF); default: <scene>.nc, and <scene>.<analysis>.nc where the scene file asks for another."
+output_option = click.option("-o", "--output", type=OUTPUT_FILE, help=_RESULT)
 # Of analyses whose --output is a quantity.
-file_option = click.option(
-    "-o", "--file", "output", type=OUTPUT_FILE, help="Result file (netCDF); default: <scene>.nc."
-)
+file_option = click.option("-o", "--file", "output", type=OUTPUT_FILE, help=_RESULT)
 parameter_option = click.option(
     "-p",
     "--parameter",

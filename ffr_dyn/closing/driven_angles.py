@@ -13,7 +13,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ffr_dyn.closing.constraints import Constraints
+from ffr_dyn.closing.going_on import going_on
+from ffr_dyn.closing.positions import LARGEST_TURN, close_velocities, largest_turn
 from ffr_dyn.equations.constraints import Markers
+from ffr_dyn.equations.layout import moved, to_body_axes
 from ffr_dyn.scene.joints import DRIVEN_ANGLE
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
@@ -49,37 +52,67 @@ def driven_angles(constraints: Constraints, x: Array) -> list[DrivenAngle]:
 
 def led_to_drivers(constraints: Constraints, x: Array, close: Callable[[Constraints, Array], Array]) -> Array:
     """`close(constraints, x)`, positions that meet all rows, in steps where driven angles at x are far from their drivers'
-    values.
+    values, or no other way leads there.
 
     Raises what `close` does.
     """
-    angles = driven_angles(constraints, x)
+    angles, errors = driven_angles(constraints, x), list[InputError]()
     if all(abs(angle.left) <= FAR for angle in angles):
-        return close(constraints, x)
-    errors = []
-    for way in _ways(angles):
-        found, count = x, int(np.ceil(max(abs(left) for left in way) / STEP))
         try:
-            for k in range(count + 1):
-                found = close(_driven_to(constraints, angles, [(k / count - 1.0) * left for left in way]), found)
+            return close(constraints, x)
         except InputError as error:
             errors.append(error)
-        else:
-            return found
+    for way in _ways(angles):
+        try:
+            return _led(constraints, angles, way, x, close)
+        except InputError as error:
+            errors.append(error)
     raise errors[0]
+
+
+def _led(
+    constraints: Constraints,
+    angles: list[DrivenAngle],
+    way: list[float],
+    x: Array,
+    close: Callable[[Constraints, Array], Array],
+) -> Array:
+    """Positions that meet all rows, from x along the ways [rad] of the driven angles."""
+    count = int(np.ceil(max(abs(left) for left in way) / STEP))
+    found = close(_driven_to(constraints, angles, way, -1.0, 1.0 / max(count, 1)), x)
+    for k in range(1, count + 1):
+        begun = _driven_to(constraints, angles, way, (k - 1) / count - 1.0, 1.0 / count)
+        found = close(_driven_to(constraints, angles, way, k / count - 1.0, 1.0 / count), _ahead(begun, found))
+    return found
+
+
+def _ahead(constraints: Constraints, x: Array) -> Array:
+    """x, and in a singular position moved along the branch that the drivers go, from where Newton's method finds it."""
+    place = constraints.place
+    try:
+        v = close_velocities(constraints, x, np.zeros(place.v_size))
+    except InputError:
+        return x
+    step = to_body_axes(place, x, going_on(constraints, x, v))
+    singular = not np.array_equal(step, to_body_axes(place, x, v))
+    return moved(place, x, step) if singular and largest_turn(place, step) <= LARGEST_TURN else x
 
 
 def _ways(angles: list[DrivenAngle]) -> Iterator[list[float]]:
     """How far each is turned: the shorter way, then the one that has farthest to go the other way round."""
     left = [angle.left for angle in angles]
+    if not any(left):
+        return
     yield left
     far = int(np.argmax(np.abs(left)))
     yield [turn - np.copysign(TURN, turn) if k == far else turn for k, turn in enumerate(left)]
 
 
-def _driven_to(constraints: Constraints, angles: list[DrivenAngle], off: list[float]) -> Constraints:
-    """The rows with driven angles that are off their values."""
+def _driven_to(
+    constraints: Constraints, angles: list[DrivenAngle], way: list[float], off: float, rate: float
+) -> Constraints:
+    """The rows with driven angles that are a share of their ways off their values, and move at a rate of it."""
     drives = constraints.drives.copy()
-    for angle, less in zip(angles, off, strict=True):
-        drives[angle.function] = angle.value + less, 0.0, 0.0
+    for angle, left in zip(angles, way, strict=True):
+        drives[angle.function] = angle.value + off * left, rate * left, 0.0
     return replace(constraints, drives=drives)

@@ -7,18 +7,22 @@ may be anywhere there: their rows count, their values do not. (Nikravesh 1988, c
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from scipy.linalg import qr
 from scipy.sparse import csr_array, vstack
 
 from ffr_dyn.closing.constraints import Constraints, of_blocks, rows_at, without
+from ffr_dyn.closing.going_on import going_on
 from ffr_dyn.closing.positions import TOLERANCE, close_positions, largest_turn, weights
 from ffr_dyn.closing.row_space import Dependence, Matrix, dependence, smallest_solution
 from ffr_dyn.compile.row_tables import moving_bodies
 from ffr_dyn.equations.constraint_rows import Block
-from ffr_dyn.equations.layout import Layout, moved, to_body_axes
+from ffr_dyn.equations.layout import Layout, moved, to_body_axes, to_global_axes
 from ffr_dyn.scene.scene import Scene, markers
 from ffr_prep.common.arrays import Array
+from ffr_prep.common.brief import Brief
 from ffr_prep.common.errors import InputError
 
 AWAY = (0.1, 0.05, 0.2, 0.1, 0.05, 0.2, 0.4, 0.1)  # rad, or of the size of the largest body: to a neighbouring position
@@ -29,20 +33,30 @@ CLEAR = 1e-5  # length of the shortest combination of rows that does not vanish,
 TAKES_PART = 1e-6  # of a row in a combination that vanishes
 
 
-def independent_blocks(constraints: Constraints, x: Array, v: Array) -> tuple[list[Block], list[tuple[str, str]]]:
-    """Blocks without their redundant words, and the (block, word) pairs that were dropped.
+@dataclass(frozen=True, repr=False)
+class Independent(Brief):
+    """Blocks without their redundant words, the (block, word) pairs that were dropped, and whether rows depend on one another
+    at the position alone, which then is singular."""
 
-    Raises InputError when a driver's row is redundant.
-    """
-    blocks, N = list(constraints.blocks), dependence_in_motion(constraints, x, v).combinations
+    blocks: list[Block]
+    redundant: list[tuple[str, str]]
+    singular: bool
+
+
+def independent_blocks(constraints: Constraints, x: Array, v: Array) -> Independent:
+    """The rows that the motion needs. Raises InputError when a driver's row is redundant."""
+    here = _dependence(constraints, x, v)
+    in_motion = _in_motion(constraints, x, v, here)
+    blocks, N, singular = list(constraints.blocks), in_motion.combinations, here.count > in_motion.count
     for name in _drivers_in(N, blocks):
         raise InputError(f"driver {name!r} prescribes a motion that the joints and other drivers already fix")
     if not N.size:
-        return blocks, []
+        return Independent(blocks, [], singular)
     said = [(block, word) for block in blocks for word in block.words]
     # what is left of the combinations in these rows is as regular as can be, and so are the rows that are kept
     out = np.sort(qr(N.T, mode="r", pivoting=True)[1][: N.shape[1]])
-    return without(blocks, np.isin(np.arange(len(said)), out)), [(said[k][0].name, said[k][1].text) for k in out]
+    dropped = [(said[k][0].name, said[k][1].text) for k in out]
+    return Independent(without(blocks, np.isin(np.arange(len(said)), out)), dropped, singular)
 
 
 def redundant_drivers(constraints: Constraints, x: Array, v: Array) -> tuple[str, ...]:
@@ -59,7 +73,10 @@ def _drivers_in(N: Array, blocks: list[Block]) -> tuple[str, ...]:
 
 def dependence_in_motion(constraints: Constraints, x: Array, v: Array) -> Dependence:
     """How the rows depend on one another at x or, if they do so less, at its neighbours."""
-    here = _dependence(constraints, x, v)
+    return _in_motion(constraints, x, v, _dependence(constraints, x, v))
+
+
+def _in_motion(constraints: Constraints, x: Array, v: Array, here: Dependence) -> Dependence:
     if not here.count:
         return here
     blocks = list(constraints.blocks)
@@ -122,9 +139,6 @@ def _dependence(constraints: Constraints, x: Array, v: Array) -> Dependence:
 def _neighbour(constraints: Constraints, x: Array, v: Array, number: int, away: float) -> Array | None:
     """A position that meets the rows, a free motion away from x: the one that is under way, or one at random; None where
     there is none.
-
-    Where first-order motions do not go on, as most do not in a singular position, Newton's method would lead back to x, so
-    its steps are at right angles to the way from there: it turns the way into one that does go on.
     """
     scene, place = constraints.scene, constraints.place
     W, J = _rigid(constraints, x, v)[1:]
@@ -133,10 +147,23 @@ def _neighbour(constraints: Constraints, x: Array, v: Array, number: int, away: 
     if number == 0 and (own := tied * _rigid_part(place, to_body_axes(place, x, v))).any():
         wanted = own
     way = wanted - W @ smallest_solution(J @ W, J @ wanted)
-    extent = _extent(scene, place, way)
-    if not extent > NOTHING * _extent(scene, place, wanted):
+    if not _extent(scene, place, way) > NOTHING * _extent(scene, place, wanted):
         return None
-    way *= away / extent
+    found = _along(constraints, x, v, way, away)
+    if found is None:
+        way = to_body_axes(place, x, going_on(constraints, x, to_global_axes(place, x, way)))
+        found = _along(constraints, x, v, way, away)
+    return found
+
+
+def _along(constraints: Constraints, x: Array, v: Array, way: Array, away: float) -> Array | None:
+    """A position that meets the rows so far along a way (V,) from x; None where none is found.
+
+    In a singular position Newton's method would lead back to x, so its steps are at right angles to the way from there: they
+    turn most ways that do not go on into one that does.
+    """
+    scene, place = constraints.scene, constraints.place
+    way = way * (away / _extent(scene, place, way))
     found = moved(place, x, way)
     for _ in range(ITERATIONS):
         Phi, W, J = _rigid(constraints, found, v)

@@ -1,4 +1,4 @@
-"""What bodies must have to move: inertia against every rigid motion that the scene leaves them.
+"""The inertia that bodies need: against every rigid motion that the scene leaves them.
 
 Bodies from files of other programs may lack it (`ffr_prep.body.immovable`), or have it in one plane alone.
 """

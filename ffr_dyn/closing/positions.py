@@ -76,6 +76,14 @@ def close_velocities(constraints: Constraints, x: Array, v: Array) -> Array:
     )
 
 
+def rigid_jacobian(constraints: Constraints, x: Array) -> tuple[Array, Array]:
+    """W^(1/2) (V, r) of the r rigid motions that there are, and J W^(1/2) (C, r) at x, dense."""
+    J = rows_at(constraints, x, np.zeros(constraints.place.v_size)).J
+    W = np.asarray(weights(constraints.scene, constraints.place, x, False, True))
+    W = W[:, W.any(axis=0)]
+    return W, (J if isinstance(J, np.ndarray) else J.toarray()) @ W
+
+
 def weights(scene: Scene, place: Layout, x: Array, elastic: bool, dense: bool) -> Matrix:
     """W^(1/2) (V, V) with W the inverse mass matrix; zero for coordinates that may not move."""
     roots = [_root(body, x[place.q(b)], tuple(place.active(b)), elastic) for b, body in enumerate(scene.bodies)]

@@ -1,4 +1,4 @@
-"""What the rows of matrices span: which of them depend on one another, and smallest solutions.
+"""The row space of matrices: which rows depend on one another, and smallest solutions.
 
 A few rows are dense matrices, decomposed by singular values. Many are sparse ones: constraint rows touch two bodies each, and
 a sparse factor of their Gram matrix costs in proportion to their number for chains and trees. It squares what rows have of

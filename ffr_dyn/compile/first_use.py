@@ -59,7 +59,7 @@ def _begin(kinds: Sequence[type[Integrator]], of_scene: Sequence[CompiledFunctio
 
 
 def _of_any_scene() -> list[CompiledFunction]:
-    """What a scene with applied loads needs whatever the method."""
+    """Compiled functions that a scene with applied loads needs whatever the method."""
     usual = [entry.general for entry in ENTRY_POINTS.values() if entry.needed is always]
     return [*usual, add_loads.general, load_powers.general]
 

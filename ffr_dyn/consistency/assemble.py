@@ -12,6 +12,7 @@ import numpy as np
 
 from ffr_dyn.closing.constraints import Constraints, constraints_of, without
 from ffr_dyn.closing.driven_angles import led_to_drivers
+from ffr_dyn.closing.going_on import going_on
 from ffr_dyn.closing.independence import independent_blocks
 from ffr_dyn.closing.inertia_left import require_inertia
 from ffr_dyn.closing.positions import close_positions, close_velocities
@@ -33,6 +34,10 @@ from ffr_prep.common.errors import InputError
 
 SHIFTED = 1e-6  # m, rad, from where it is told that assembly moved a body
 RELAXATION = 1e-6  # of dependent rows, relative: rounding over it is what their reactions are uncertain by
+BRANCHES = (
+    "the scene starts in a singular position, where its motion may branch: to choose, draw it a little way along the branch "
+    "that is meant"
+)
 TORN = 0.5  # elastic displacement of an interface over the size of its body that no joint may ask for
 
 
@@ -76,13 +81,18 @@ def assemble(scene: Scene, *, time: float = 0.0) -> Assembled:
     guess, v = initial_state(scene, place)
     x = led_to_drivers(rows, guess, lambda driven, at: close_positions(driven, at, v))
     _require_shape(scene, place, guess, x)
-    kept, redundant = independent_blocks(rows, x, v)
+    found = independent_blocks(rows, x, v)
+    kept, redundant = found.blocks, found.redundant
     v = close_velocities(rows, x, v)
+    if found.singular:
+        v = going_on(rows, x, v)
     count = sum(len(block.words) for block in kept)
     notes = [
         f"{block}: the row '{text}' is redundant; of the reactions that are possible the smallest are given"
         for block, text in redundant
     ] + left_out
+    if found.singular:
+        notes.insert(0, BRANCHES)
     notes = shifted(scene, place, guess, x) + notes
     if scene.plane != "none":
         notes.append(

@@ -30,7 +30,7 @@ TIME, BEGUN, WORK, OPEN, MOST, WORST, WHEN, POWER, BEFORE = range(9)
 
 @dataclass(frozen=True)
 class Account:
-    """What the rows of a run have shown so far.
+    """The account of the energy of a run: the rows so far.
 
     numbers : (9,) time of the last row, energy at the start, work since, what rows leave open of it, largest energy of motion
               and strain, largest difference between energy and work, its time, power of the last row and of the one before
@@ -62,7 +62,7 @@ def add_rows(account: Account, rows: Record, powers: Array) -> None:
 
 
 def amiss(account: Account, method: str, remedy: str) -> list[str]:
-    """What of the energy of a run has no source, or has gone nowhere; `remedy` is a sentence without its end."""
+    """Notes on energy of a run that has no source, or has gone nowhere; `remedy` is a sentence without its end."""
     scene, (most, worst, when) = account.system.scene, account.numbers[[MOST, WORST, WHEN]]
     least = QUIET * sum(body.model.mass for body in scene.bodies)
     if not abs(worst) > max(AMISS * most, least) or (account.system.model.base >= 0).any():

@@ -1,4 +1,4 @@
-"""What every analysis is looked at for, and what it does about it: a note of its result, or an error.
+"""The table of doubts: for every analysis, what is checked and whether it makes a note of the result or an error.
 
 `TABLE` says which, for each doubt and analysis; docs/analyses.md shows it. The rows of an analysis go through `look`, as many
 at a time as it has, and `ended` tells what they have shown. Doubts that a scene raises before anything moves are notes of
@@ -74,7 +74,7 @@ DEPENDENT = 1e-8  # smallest eigenvalue of a mass matrix with ones on its diagon
 
 @dataclass(frozen=True)
 class Seen:
-    """What the rows of an analysis have shown so far, in arrays that change.
+    """The observations of the rows of an analysis so far, in arrays that change.
 
     method    : of its steps; None where it has none
     tolerance : that constraints are to be met with [m, -];  apart : from where a mechanism has come apart
@@ -154,7 +154,7 @@ def _driven(view: View, driver: Driver | PointDriver) -> tuple[float, float]:
 
 
 def between_rows(seen: Seen, system: System, work: Work, rows: Record) -> dict[str, list[str]]:
-    """What steps have left open and a projection has closed: the row that was open most, of those that an engine computes."""
+    """Doubts about rows that steps have left open and a projection has closed: the one that was open most."""
     method, opened, time = seen.method, float(work.drift[PHI]), float(work.drift[MOMENT])
     if method is None or method.controlled or seen.apart == np.inf:
         return {}

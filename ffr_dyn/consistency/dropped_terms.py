@@ -54,7 +54,7 @@ def check_dropped(body: Body, active: Sequence[int]) -> list[str]:
 
 
 def remedy(body: Body) -> str:
-    """What to do about terms whose lack leaves no mass matrix."""
+    """The remedy for dropped terms without which there is no mass matrix."""
     halves = {"I3", "I4"} & set(body.dropped)
     if len(halves) == 1:
         return f"drop {({'I3', 'I4'} - halves).pop()} with it, or keep it"

@@ -79,7 +79,7 @@ def _largest(A: Array) -> float:
 
 
 def _share(now: At, force: Force, measured: Array, row: int) -> float:
-    """What a force on a joint coordinate damps at its rate, over what it damps at rest: 1 where rows pass a rest."""
+    """The damping of a force on a joint coordinate at its rate, over that at rest: 1 where rows pass a rest."""
     if not isinstance(force.place, OnJoint) or not force.stiff_coordinates:
         return 1.0
     rates, c = measured[:, RATE], float(measured[row, COORDINATE])

@@ -1,4 +1,4 @@
-"""What to tell of a run that failed: time, body or joint, the likely cause and what to change."""
+"""Messages about a run that failed: time, body or joint, the likely cause and what to change."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class Settings:
 
 
 def failure(system: System, work: Work, status: int, time: float, settings: Settings = Settings()) -> BaseException:
-    """What to tell about a status of the kernels."""
+    """The error for a status of the kernels."""
     cause = settings.cause
     at, where = f"at t = {time:.6g} s", int(work.info[FAILED])
     if system.user.cause is not None:

@@ -1,4 +1,4 @@
-"""What can move: degrees of freedom, redundant rows, and the free motions in words. The look before every analysis."""
+"""Mobility: degrees of freedom, redundant rows, and the free motions in words. The look before every analysis."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class FreeMotion(Brief):
 
 @dataclass(frozen=True, repr=False)
 class Mobility(Brief):
-    """What the joints and drivers of a scene leave free at its assembled start.
+    """The freedom that the joints and drivers of a scene leave at its assembled start.
 
     degrees_of_freedom : rigid and elastic;  elastic : number of elastic coordinates
     plane      : normal of a planar scene, "x", "y" or "z"; otherwise "none". A scene that declares no plane is looked at in
@@ -72,7 +72,7 @@ class Mobility(Brief):
 
 
 def counted(degrees_of_freedom: int, elastic: int, redundant: int) -> str:
-    """What can move, in words: "3 rigid degrees of freedom, 2 redundant rows; 101 elastic coordinates"."""
+    """The counts in words: "3 rigid degrees of freedom, 2 redundant rows; 101 elastic coordinates"."""
     rigid, rows = degrees_of_freedom - elastic, f", {redundant} redundant row{'s' * (redundant > 1)}" * bool(redundant)
     said = (
         f"{max(rigid, 0)} rigid degree{'s' * (rigid != 1)} of freedom{rows}"
@@ -120,9 +120,11 @@ def require_driven(scene: Scene, time: float, analysis: str) -> None:
             f"over-driven: {', '.join(map(repr, over))} prescribe a motion that the joints and other drivers already fix; "
             "remove a driver"
         )
-    free = mobility(scene, time=time).free
-    if free:
-        said = "; ".join(f"{motion.name} (moves {', '.join(motion.bodies)})" for motion in free)
+    found = mobility(scene, time=time)
+    if (
+        found.degrees_of_freedom > found.elastic
+    ):  # at a singular position there are more free motions than the mechanism has
+        said = "; ".join(f"{motion.name} (moves {', '.join(motion.bodies)})" for motion in found.free)
         raise InputError(f"{analysis} needs every rigid motion prescribed by a driver; free: {said}")
 
 

@@ -1,4 +1,4 @@
-"""What the length of the steps costs every output of a run: compared with runs of other steps, and with a twin.
+"""The error that the length of the steps makes in every output of a run: compared with runs of other steps, and with a twin.
 
 Two runs that damp a vibration which neither resolves agree on the wrong curve, so that their difference tells nothing. Hence
 the twin (`ffr_dyn.integrators.ros2.Twin`), which keeps its amplitude: with R of the run, at steps h and r h, order p,
@@ -24,13 +24,15 @@ forces take ROS3 down to order two, which p is for it. The factors were measured
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
 from ffr_dyn.results.result import Result
 from ffr_prep.common.arrays import Array
+from ffr_prep.common.units import natural
 
 VIBRATION = 4.5  # v over s beyond which a difference is vibration that the step does not resolve
 LITTLE = 1e-3  # of the largest range of its kind: an output that moves by less counts as if it moved by this
@@ -42,6 +44,7 @@ FAR, NEXT = 0.1, 2.0  # of the range, by which a step up to so many times as lon
 NOISE = (70 / 36) ** 0.5  # by which rows without relation are farther off the curve than they are large
 RATES = {"position": "velocity", "R": "v", "q": "q_dot"}
 CONSTANT = 1e-7  # of the size of a kind: a range below it is rounding, as of the rate of an even turn
+ROUNDING = 1e-10  # of what a scene's mass, length and speed make of a unit
 AT_ONCE = 2e7  # bytes of numbers that are compared side by side
 COARSE = 0.01  # of the range, by which a row may be off the curve through its neighbours
 
@@ -186,7 +189,7 @@ def largest_difference(one: Array, other: Array) -> float:
 
 def ranges(run: Result) -> dict[str, float]:
     """Of every output but the violations of constraints: the largest range of a component, floored by those of its kind (the
-    last part of its name), where next to nothing moves, and by the rounding of what is constant."""
+    last part of its name), where next to nothing moves, and by rounding."""
     spans: dict[str, float] = {}
     sizes: dict[str, float] = {}
     for names in _batches(run, (name for name in run.quantities if not name.startswith("constraint."))):
@@ -195,6 +198,9 @@ def ranges(run: Result) -> dict[str, float]:
         spans |= zip(names, of.largest(moved).tolist(), strict=True)
         for name, size in zip(names, of.largest(np.abs(of.table).max(axis=0, initial=0.0)).tolist(), strict=True):
             sizes[_kind(name)] = max(size, sizes.get(_kind(name), 0.0))
+    sizes["position"] = max(
+        sizes.get("position", 0.0), run.attributes.get("length", 0.0)
+    )  # a pivot at the origin is at zero
     largest: dict[str, float] = {}
     for name, span in spans.items():
         largest[_kind(name)] = max(span, largest.get(_kind(name), 0.0))
@@ -205,7 +211,19 @@ def ranges(run: Result) -> dict[str, float]:
     }
     for kind, floor in _floors_at_rest(run, sizes).items():
         floors[kind] = max(floors.get(kind, 0.0), floor)
-    return {name: max(span, floors[_kind(name)]) for name, span in spans.items()}
+    rounding = _rounding(run, sizes)
+    return {name: max(span, floors[_kind(name)], rounding(run.quantities[name].unit)) for name, span in spans.items()}
+
+
+def _rounding(run: Result, sizes: dict[str, float]) -> Callable[[str], float]:
+    """Of a unit, what is rounding in a scene of this mass, length and speed, such as the acceleration of a pivot at rest."""
+    lasts, length, force = float(np.ptp(run.time)), sizes["position"], sizes.get("force", 0.0)
+    speed = max(sizes.get("velocity", 0.0), sizes.get("omega_bar", 0.0) * length, length / lasts if lasts > 0 else 0.0)
+    if not speed > 0:
+        return lambda unit: 0.0
+    time = length / speed
+    mass = max(run.attributes.get("mass", 0.0), force * time**2 / length)
+    return cache(lambda unit: ROUNDING * natural(unit, mass, length, time))
 
 
 def _floors_at_rest(run: Result, sizes: dict[str, float]) -> dict[str, float]:

@@ -47,7 +47,7 @@ def vibrations(assembled: Assembled, time: float) -> Vibrations:
 
 
 def lasting(of: Vibrations, step: float) -> float:
-    """What the damping of the scene leaves, after a step of h [s], of the slowest vibration that such steps do not resolve:
+    """The share that damping leaves, after a step of h [s], of the slowest vibration that such steps do not resolve:
     exp(-zeta h omega), with the smallest damping ratio of them. 1 where there is none."""
     beyond = of.omega * step > UNRESOLVED
     if not beyond.any():

@@ -1,4 +1,4 @@
-"""What a search has made and run so far, and what that has cost: no model is assembled or run twice."""
+"""The cache of a search: the models made and the runs done so far, and their cost. No model is assembled or run twice."""
 
 from __future__ import annotations
 
@@ -114,7 +114,7 @@ class Ledger:
         return self._call(choice, is_twin)(None) if outcome is None else outcome
 
     def _call(self, choice: Choice, is_twin: bool) -> Callable[[Say | None], Trial]:
-        """What makes a run, or its twin."""
+        """The call that makes a run, or its twin."""
         made, method = self.made(choice), None
         if is_twin:
             step = self.span.output_step / choice.divisions

@@ -114,7 +114,7 @@ def stiffening_loads(trial: Trial, policy: Policy = DEFAULT) -> tuple[Stiffening
 
 
 def load_names(body: Body) -> tuple[str, ...]:
-    """What stiffens a body, in words, by the number of the load."""
+    """The names of the loads that stiffen a body, by number."""
     return (
         *INERTIAL,
         *(f"{what} {i.name} {c}" for i in body.model.interfaces for what in ("force at", "moment at") for c in "xyz"),

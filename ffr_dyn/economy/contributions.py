@@ -1,4 +1,4 @@
-"""What each elastic coordinate of a motion does to each output: a ranking, and a first guess of what a model needs."""
+"""The contribution of each elastic coordinate to each output: a ranking, and a first guess of what a model needs."""
 
 from __future__ import annotations
 
@@ -191,7 +191,7 @@ def effects_of(
 
 
 def _changed(seen: Samples, rows: Array, shift: Array, rates: Array) -> Record:
-    """What the model records at the states of `rows`, each moved by a row of `shift` and `rates` (K, V)."""
+    """The record of the model at the states of `rows`, each moved by a row of `shift` and `rates` (K, V)."""
     place = seen.system.layout
     x = np.array([moved(place, seen.x[k], step) for k, step in zip(rows, shift, strict=True)])
     v = np.array([

@@ -1,4 +1,4 @@
-"""What a run costs, from the sizes of its model: microseconds that do not depend on the day, so that a search is repeatable.
+"""The cost of a run, from the sizes of its model: microseconds that do not depend on the day, so that a search is repeatable.
 
 The constants are what `python -m benchmarks.cost_model` prints, fitted to processor times of the compiled loop for mechanisms
 of two to six bodies with none to fourteen modes a body, in the plane and in space, with and without geometric stiffening

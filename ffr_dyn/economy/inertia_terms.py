@@ -1,4 +1,4 @@
-"""What inertia terms and geometric stiffening do to the outputs, without a run: their forces, and what follows.
+"""The effect of inertia terms and geometric stiffening on the outputs, without a run: their forces, and what follows.
 
 All forces of a term are linear in its integrals; those of stiffening come load by load. Each drives the modes one-way as
 passive oscillators, and the outputs change in proportion. What a term does to the large motion of a free body by way of its
@@ -25,7 +25,7 @@ DROPPED = ("I9", "I5", "I8")  # terms that may be left out; I3 and I4 are what c
 
 @dataclass(frozen=True, eq=False)
 class TermEffect:
-    """What a term of a body does to each output.
+    """The effect of a term of a body on each output.
 
     body : number;  term : of `DROPPED`, or `STIFFENING` by one load, its number in `load`;  effect : (outputs,)
     """
@@ -97,7 +97,7 @@ def _inertial(seen: Samples) -> Iterator[_Force]:
 
 
 def _integrals(model: FlexibleBody, term: str) -> tuple[Array, Array]:
-    """What of int u phi^T dm, undeformed (3, 3, n) and per mode (3, 3, n, n), belongs to a term; zeros for the rest."""
+    """The part of a term in int u phi^T dm, undeformed (3, 3, n) and per mode (3, 3, n, n); zeros for the rest."""
     rP, PP = (0.5 * (t + np.swapaxes(t, 0, 1)) for t in (model.rP_dm, model.PP_dm))
     parts = {"I8": (rP, 0 * PP), "I9": (0 * rP, PP), "I5": (0 * rP, model.PP_dm - PP)}
     return parts[term]

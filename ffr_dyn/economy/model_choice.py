@@ -1,4 +1,4 @@
-"""What is modelled of a scene: modes and terms of every body, the plane, the integrator and its step."""
+"""The choice of a model of a scene: modes and terms of every body, the plane, the integrator and its step."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ RIGID, QUASI_STATIC, FLEXIBLE = "rigid", "quasi-static", "flexible"
 
 @dataclass(frozen=True)
 class Part:
-    """What is modelled of one body.
+    """The choice of a model of one body.
 
     modes   : numbers of the elastic coordinates that are used, from 0, ascending
     dropped : terms that its equations leave out (see `ffr_dyn.variants.variant.TERMS`)
@@ -203,7 +203,7 @@ def orthonormal(shapes: Array, omega2: Array) -> Array:
 
 
 def kind(scene: Scene, choice: Choice, number: int, output_step: float) -> str:
-    """What a body is in a model: rigid, quasi-static (no mode is slow enough for the step to see it vibrate) or flexible."""
+    """The kind of a body in a model: rigid, quasi-static (no mode is slow enough for the step to resolve it) or flexible."""
     part, model = choice.parts[number], scene.bodies[number].model
     if not part.count:
         return RIGID

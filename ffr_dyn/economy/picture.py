@@ -73,7 +73,7 @@ def draw(found: Economy, path: str | Path) -> Path:
 
 
 def _reference(found: Economy) -> Reference:
-    """What errors are measured from: the run of a verification, whose own error is the floor."""
+    """The reference from which errors are measured: the run of a verification, whose own error is the floor."""
     names = [output.name for output in found.probe.outputs]
     verified = found.verification
     scales = {name: float(scale) for name, scale in zip(names, found.scales, strict=True)}

@@ -46,7 +46,7 @@ PLANE = BodyCost(0.49, 0.15, 0.029, 0.002, 0.29, 0.0, 0.005)
 
 @dataclass(frozen=True)
 class CostModel:
-    """What a run costs, in microseconds that do not depend on the day (see `ffr_dyn.economy.cost`). Only ratios matter."""
+    """The cost of a run, in microseconds that do not depend on the day (see `ffr_dyn.economy.cost`). Only ratios matter."""
 
     scene: float = number(0.20, "us", "an evaluation of nothing", TIMES)
     space: BodyCost = number(SPACE, "us", "a body in space", TIMES)  # noqa: RUF009

@@ -190,7 +190,7 @@ def _nearest(found: Economy) -> Table:
 
 
 def _terms(found: Economy) -> Table:
-    """What inertia terms and stiffening loads do: those dropped that do most, and those kept that do least."""
+    """The table of inertia terms and stiffening loads: those dropped that do most, and those kept that do least."""
     here = [one for one in found.terms if found.choice.parts[one.body].count]
     out = [one for one in here if not kept(found.choice, one)]
 

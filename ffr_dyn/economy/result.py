@@ -1,4 +1,4 @@
-"""What a search for the cheapest model finds."""
+"""The result of a search for the cheapest model."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class Verification(Brief):
 
 @dataclass(frozen=True, repr=False)
 class Economy(Brief):
-    """What was found.
+    """The result of `economise`.
 
     choice, scene, settings : the model;  scene is ready to run with `ffr_dyn.analyses.run.run(scene, settings)`
     limits       : (outputs,) tolerances in the units of the outputs;  scales : (outputs,) their ranges

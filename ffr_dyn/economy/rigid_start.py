@@ -65,7 +65,7 @@ class Rigid:
     spatial: Choice
 
     def contributions(self, limit: Array) -> Contributions:
-        """What each mode would do."""
+        """The contributions that each mode would make."""
         ledger = self.ledger
         ledger.tell("modes driven by the rigid motion")
         return of_omitted(ledger, self.trial, self.everything, limit)

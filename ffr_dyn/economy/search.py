@@ -367,7 +367,7 @@ def _settings(span: Span, choice: Choice, of: Probe) -> Settings:
 
 
 def _explained(ledger: Ledger, found: Chosen, final: Trial) -> tuple[Contributions, Contributions]:
-    """What the modes that stay do, and what those left out would."""
+    """The contributions of the modes that stay, and those that the modes left out would make."""
     ledger.tell("what is nearest to mattering")
     if not any(part.modes for part in final.choice.parts):
         return nothing(ledger.of), found.omitted

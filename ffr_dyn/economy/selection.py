@@ -120,7 +120,7 @@ def selected_model(
 
 
 def _rankings(ledger: Ledger, ground: Ground, omitted: Contributions) -> tuple[list[Ranking], tuple[TermEffect, ...]]:
-    """What modes do, driven by the rigid motion or, where nearly all are needed, in the full one; principal shapes; terms."""
+    """Rankings of modes, driven by the rigid motion or, where nearly all are needed, in the full one; shapes; terms."""
     ledger.tell("modes and terms along the motion of the full model")
     seen = own(ledger, ground.pilot)
     needed = (omitted.effect > ledger.policy.modes_share * ground.limits / max(1, len(omitted.body))).any(axis=1)

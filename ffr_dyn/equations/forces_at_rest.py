@@ -155,7 +155,7 @@ def _by_speed(now: At, law: Callable[[At], Array]) -> Array:
 
 
 def _along(total: Sums, now: At, force: Force) -> tuple[Array, Array, Callable[[At, Array], Array]]:
-    """What a force acts along (K, V), the coordinates of whose rates it is a function (L, V), and that function."""
+    """The coordinates that a force acts along (K, V), those of whose rates it is a function (L, V), and that function."""
     place, scene = force.place, now.scene
     if isinstance(place, AtMarker):
         marker, way = total.placed[place.ends(scene)[0]], np.zeros((6, now.place.v_size))

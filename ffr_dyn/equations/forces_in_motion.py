@@ -21,7 +21,7 @@ from ffr_prep.common.arrays import Array
 
 
 def add_velocities(total: Sums, damping: Array, now: At, force: Force, screws: tuple[Array, Array]) -> None:
-    """What the velocities of two markers in their screws (u (2, 3), w (2, 3)) add to forces and their tangent, and to the
+    """Add the part of the velocities of two markers in their screws (u (2, 3), w (2, 3)) to forces, their tangent, and the
     damping (V, V), of a force on coordinates whose law sees these and their rates alone."""
     ends = force.place.ends(now.scene)
     both = [total.placed[number] for number in ends]

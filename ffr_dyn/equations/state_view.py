@@ -1,4 +1,4 @@
-"""What a user's Python force sees of the moving system: bodies in their own frames, however they are computed."""
+"""The view that a user's Python force has of the moving system: bodies in their own frames, however they are computed."""
 
 from __future__ import annotations
 

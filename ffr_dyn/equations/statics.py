@@ -106,7 +106,7 @@ def _add_block(total: Sums, block: Block, t: float, multipliers: Iterator[float]
 
 
 def _jets(total: Sums, block: Block, word: Word, s: float) -> list[tuple[tuple[int, int], Jet]]:
-    """What a row is the sum of, with the markers of each."""
+    """The terms whose sum is a row, with the markers of each."""
     found = []
     for k in range(0, len(block.markers), 2):
         ends = block.markers[k], block.markers[k + 1]

@@ -112,13 +112,21 @@ def table(times: Array, values: Array) -> TimeFunction:
 
 
 def piecewise(breaks: Array, coefficients: Array) -> TimeFunction:
-    """Piecewise polynomial: coefficients (pieces, k), ascending powers of (t - start of the piece).
+    """Piecewise polynomial between breaks (pieces + 1,); coefficients (pieces, k) of the powers of t less the piece's start.
+
+    Raises InputError for other shapes, breaks that do not increase, and numbers that are not finite.
 
     >>> ramp = fd.piecewise(np.array([0.0, 1.0, 2.0]), np.array([[0.0, 1.0], [1.0, 0.0]]))
     """
-    pieces, count = np.shape(coefficients)
+    shape, steps = np.shape(coefficients), np.diff(np.asarray(breaks, float))
+    if len(shape) != 2 or steps.shape != shape[:1] or not (steps > 0).all():
+        raise InputError(
+            f"a piecewise polynomial needs coefficients (pieces, k) and increasing breaks (pieces + 1,); here are {shape} "
+            f"coefficients and {np.size(breaks)} breaks. For values at times use `table`"
+        )
     return TimeFunction(
-        PIECEWISE, (float(pieces), float(count), *map(float, breaks), *map(float, np.ravel(coefficients)))
+        PIECEWISE,
+        (float(shape[0]), float(shape[1]), *_numbers("piecewise polynomial", (*breaks, *np.ravel(coefficients)))),
     )
 
 

@@ -106,7 +106,7 @@ def together(
 
 
 class _Shared:
-    """What the threads of a batch have in common: calls that are left, what they tell, and whether it is given up."""
+    """The state that the threads of a batch share: calls that are left, what they tell, and whether it is given up."""
 
     def __init__(self, calls: Sequence[Callable[[Say], Any]]) -> None:
         self.calls = calls

@@ -28,7 +28,7 @@ from ffr_prep.common.errors import InputError
 
 
 class Integrator(Protocol):
-    """What `forward` needs of a method.
+    """The protocol of a method of `forward`.
 
     >>> isinstance(fd.ROS2(1e-3), fd.Integrator)
     """
@@ -39,7 +39,7 @@ class Integrator(Protocol):
 
     @property
     def numbers(self) -> tuple[float, ...]:
-        """What the step finds in `stages.numbers` at the start: settings, and room for what it keeps."""
+        """The numbers that the step finds in `stages.numbers` at the start: settings, and room for what it keeps."""
 
     order: ClassVar[int]
     implicit: ClassVar[bool]  # whether it treats the elastic forces implicitly
@@ -58,7 +58,7 @@ class Controlled(Integrator, Protocol):
 
     @property
     def tolerances(self) -> Tolerances:
-        """What the error may be."""
+        """The tolerances of the error of a step."""
 
     estimate_order: ClassVar[int]  # the error of a step goes as h to this power
 

@@ -119,7 +119,7 @@ def start(r, t, lag, square, single):
 
 @inlined
 def set_factors(r, square, single):
-    """What is implicit in the matrix of the iteration."""
+    """Set the implicit part of the matrix of the iteration."""
     set_diagonal(r, square**0.5)  # in which the elastic damping is right to a few per cent
     weigh_forces(r, single, square)
 
@@ -369,7 +369,7 @@ def check_iterations(tolerance: float, iterations: int) -> None:
 def newmark(
     alpha_m: float, alpha_f: float, tolerance: float, iterations: int, stabilised: bool, scaled: bool
 ) -> tuple[float, ...]:
-    """What the step finds in stages.numbers; gamma for order two, beta for the most damping (Chung & Hulbert 1993)."""
+    """The numbers in stages.numbers; gamma for order two, beta for the most damping (Chung & Hulbert 1993)."""
     gamma = 0.5 + alpha_f - alpha_m
     beta = 0.25 * (gamma + 0.5) ** 2
     settings = (alpha_m, alpha_f, beta, gamma, tolerance, iterations, stabilised, scaled)

@@ -1,4 +1,4 @@
-"""What the error of a step may be, for methods that choose their steps.
+"""Tolerances of the error of a step, for methods that choose their steps.
 
 Twin: none, data.
 """

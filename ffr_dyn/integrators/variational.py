@@ -214,7 +214,7 @@ def react_at_start(r):
 
 @inlined
 def keep_node(r):
-    """What the next step needs of its start, from an evaluation there with the true mass matrix: momenta and rows."""
+    """Keep what the next step needs of its start, from an evaluation there with the true mass matrix: momenta and rows."""
     s, bodies, bw = r.stages, r.model.bodies, r.work.bodies
     copy(bw.acc, r.v)
     to_body_axes(bodies.where, bw.A, bw.acc)

@@ -105,7 +105,7 @@ def fill_tensor(J, W):
 
 @inlined
 def prepare_body(bodies, w, b):
-    """What of the Schur complement of body b depends on the elastic diagonal alone: the factor T of the translational block
+    """The part of the Schur complement of body b that depends on the elastic diagonal alone: the factor T of the block
     m I - P_dm dinv P_dm^T."""
     n, shared = bodies.where[b, N], bodies.where[b, IN_SHARED]
     P, dinv, T = part(bodies.P_dm, 3 * shared, 3 * n), part(w.dinv, shared, n), w.T[b]

@@ -370,7 +370,7 @@ def pull_forces(
 
 @entry_point(has_stiff_forces)
 def follow_forces(r: Tables, stage: int, target: Vector) -> int:
-    """What the solution of a stage makes of the coordinates of stiff forces."""
+    """Keep the coordinates of stiff forces after a stage, from its solution."""
     wanted = vector_at(target, r.stages.target.size)
     keep_growth(r.model.rows, r.work.rows, stage, r.work.implicit[BY_RATE], wanted)
     return OK

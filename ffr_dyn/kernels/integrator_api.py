@@ -212,7 +212,7 @@ def velocity_rates(r, out):
 
 @inlined
 def begin_stages(r, gh, h):
-    """What a step of length h of a linearly implicit method has on the left side of its stages: gamma h of the elastic forces
+    """Set the left side of the stages of a linearly implicit step of length h: gamma h of the elastic forces
     and of stiff ones, whose slopes the first stage finds."""
     set_diagonal(r, gh)
     r.work.implicit[AHEAD], r.work.implicit[BY_TIME] = h, gh
@@ -232,7 +232,7 @@ def weigh_forces(r, by_rate, by_place):
 
 @inlined
 def add_stiff_part(r, stage, v, r_x, gh, shares, factors):
-    """What a stage has on its right side beside the forces: f -= gamma h Omega^2 (q_dot + r_q), and the targets of stiff
+    """Add to the right side of a stage, beside the forces: f -= gamma h Omega^2 (q_dot + r_q), and the targets of stiff
     forces, in whose coordinates are `shares` of what earlier stages made of them, and `factors` in their corrections."""
     bodies, f = r.model.bodies, r.work.bodies.f
     for b in range(bodies.mass.size):

@@ -174,7 +174,7 @@ def axis_motion(w, k, a0):
 
 @kernel
 def on_shapes(w, k, moment):
-    """What a moment (body axes) on marker k does to its rotation vector."""
+    """Add the generalised force of a moment (body axes) on marker k along its rotation vector."""
     return to_body(w.T[k], moment)
 
 

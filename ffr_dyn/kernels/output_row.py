@@ -1,4 +1,4 @@
-"""What is kept at an output time.
+"""The row that is kept at an output time.
 
 Twin: `ffr_dyn.equations.inertia.energies`.
 """

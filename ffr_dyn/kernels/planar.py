@@ -182,7 +182,7 @@ def upper(factor, b, normal):
 
 @kernel
 def couple_motions(P, H, y, n, normal, out):
-    """What couples the three rigid coordinates of a planar body with its elastic ones, and these with themselves."""
+    """The coupling of the three rigid coordinates of a planar body with its elastic ones, and of these with themselves."""
     i, j, k = in_plane(normal)
     first, second, turn = part(P, i * n, n), part(P, j * n, n), part(H, normal * n, n)
     q, f = part(y, 6, n), part(out, 6, n)

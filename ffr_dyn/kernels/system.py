@@ -56,7 +56,7 @@ RIGID, ELASTIC = (0, 1, 2, 3, 4, 5), (0, 1, 2, 6, 7, 8)
 
 @inlined
 def prepare(bodies, markers, rows, pattern, bw, mw, rw):
-    """What depends on the elastic diagonal alone. Of second-order bodies the shapes at markers do not: see `couple_joint`."""
+    """Compute what depends on the elastic diagonal alone; shapes at markers of second-order bodies do not: `couple_joint`."""
     where = bodies.where
     for b in range(bodies.mass.size):
         prepare_body(bodies, bw, b)
@@ -76,7 +76,7 @@ def prepare(bodies, markers, rows, pattern, bw, mw, rw):
 
 @inlined
 def couple_elastic(bodies, markers, rows, pattern, bw, mw, rw, p):
-    """What elastic coordinates couple of pair number p."""
+    """Add the coupling of pair number p that comes from elastic coordinates."""
     b = pattern.pair_body[p]
     n, dinv = bodies.where[b, N], part(bw.dinv, bodies.where[b, IN_SHARED], bodies.where[b, N])
     left = shapes(markers, mw.phi, rows.marker[pattern.pair[p, LATER], pattern.pair[p, LATER_SIDE]], n)

@@ -1,4 +1,4 @@
-"""What the kernels read (`Model`, constant, made by `ffr_dyn.compile.scene_tables`) and write (`Work` and others, made by
+"""Tables that the kernels read (`Model`, constant, made by `ffr_dyn.compile.scene_tables`) and write (`Work` and others, by
 `ffr_dyn.compile.workspace`); no objects inside.
 
 Bodies are numbered 0 ... B-1; number B is the ground (identity rotation, no coordinates). Positions of a body are
@@ -230,7 +230,7 @@ class MarkerWork(NamedTuple):
 
 
 class LoadWork(NamedTuple):
-    """What the kernels of forces measure, and their scratch."""
+    """The measurements of the kernels of forces, and their scratch."""
 
     reference: F1  # (O,) what was measured at the last accepted state, from which angles count their turns
     measured: F1  # (O,) of a coordinate: value, rate, force; of a bushing: six of each
@@ -312,7 +312,7 @@ class Work(NamedTuple):
 
 
 class Stages(NamedTuple):
-    """What an integrator keeps: within a step, and from step to step."""
+    """The memory of an integrator: within a step, and from step to step."""
 
     x: F2  # (stages, X)
     v: F2  # (stages, V)
@@ -374,7 +374,7 @@ class Tables(NamedTuple):
 
 
 class Record(NamedTuple):
-    """What is kept of a run, one row per output time."""
+    """The rows kept of a run, one per output time."""
 
     time: F1  # (T,)
     x: F2  # (T, X)

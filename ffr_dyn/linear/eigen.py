@@ -48,7 +48,7 @@ def eigen(K: Array, C: Array) -> Eigen:
 
 
 def _without_null_space(A: Array, tolerance: float) -> tuple[Array, list[tuple[Array, Array]]]:
-    """What is left of A when its zero eigenvalues are divided out, and the steps to vectors of all of it."""
+    """The rest of A when its zero eigenvalues are divided out, and the steps to vectors of all of it."""
     stages = []
     while len(A):
         _, sizes, W = np.linalg.svd(A)

@@ -1,4 +1,4 @@
-"""What a deformation does to vibrations beyond the second order of a body: told, since no body has it.
+"""The effect of a deformation on vibrations beyond the second order of a body: told, since no body has it.
 
 A body that is bent by q, with the strain energy E, and turned within itself by theta in a vibration, keeps of E what lies in
 planes that do not turn along: an energy of E theta^2, which is of fourth order, and of w^2 of a vibration with |y| = 1 the

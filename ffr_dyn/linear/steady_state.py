@@ -226,7 +226,7 @@ def _looks(now: At, force: Force) -> bool:
 
 
 def _add_by_differences(total: Sums, D: Array, screws: Screws, now: At, force: Force) -> None:
-    """What velocities add to a force of any kind, to its tangent and to the damping (V, V)."""
+    """Add the part that velocities have in a force of any kind, in its tangent and in the damping (V, V)."""
     place, still = now.place, np.zeros(now.v.size)
 
     def given(at: At) -> Array:

@@ -219,7 +219,7 @@ def _check_repeats(of: Turns, x: Array, v: Array, image: Array, error: float) ->
 
 @dataclass(frozen=True)
 class _Known:
-    """What is known of a map: points and their images (2 d,), in units of the scale."""
+    """The known pairs of a map: points and their images (2 d,), in units of the scale."""
 
     points: list[Array]
     images: list[Array]

@@ -1,4 +1,4 @@
-"""What moves in a mode, in words: "rod: first bending, y", "main_bearing.angle"."""
+"""Names of modes by the parts that move: "rod: first bending, y", "main_bearing.angle"."""
 
 from __future__ import annotations
 
@@ -97,7 +97,7 @@ def _sections(model: FlexibleBody) -> _Sections | None:
 
 
 def _shape(of: _Sections, q: Array) -> tuple[str, str]:
-    """What a slender body does in the deflections q (n,), complex."""
+    """The kind of deformation of a slender body in the deflections q (n,), complex."""
     u = of.displacements @ q
     flat = u - np.outer(u @ of.e, of.e)
     lateral = (flat.T @ flat.conj()).real

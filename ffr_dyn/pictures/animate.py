@@ -116,7 +116,7 @@ def _thinned(result: Result) -> Result:
 
 
 def _writer(path: Path) -> Callable[[_Show, Path], None] | None:
-    """What writes pictures of this kind; None for a page."""
+    """The function that writes pictures of this kind; None for a page."""
     writers = {".gif": _write_gif, ".mp4": _write_mp4, ".html": None}
     kind = path.suffix.lower()
     if kind not in writers:

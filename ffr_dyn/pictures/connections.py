@@ -1,4 +1,4 @@
-"""What a picture shows beside the bodies: joints with their axes, forces and moments, markers; as histories of a result."""
+"""The parts of a picture beside the bodies: joints with their axes, forces and moments, markers; as histories of a result."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ def _turned(result: Result, body: str, vector: Array) -> Array:
 
 
 def _arrows(result: Result, name: str, of: Mapping[str, Any], markers: Mapping[str, Array]) -> list[ArrowShown]:
-    """What acts on the last marker of a connection: what a result recorded, else what is said to be constant."""
+    """The loads on the last marker of a connection: those that a result recorded, else those that are said to be constant."""
     at, given = markers.get(of["at"][-1]) if of["at"] else None, of.get("constant", {})
     if at is None:
         return []

@@ -1,4 +1,4 @@
-"""What an animation shows, as arrays: poses and elastic coordinates of the bodies at the times of the pictures.
+"""The arrays of an animation: poses and elastic coordinates of the bodies at the times of the pictures.
 
 A point with the undeformed position u_0 in the body frame is drawn at R + A(p) (u_0 + u(scale q)), with the displacement
 u(q) = Phi q + u_2(q), u_2 where the body has a second order: a beam that bends keeps its length. The scale exaggerates the
@@ -165,7 +165,7 @@ class Film:
         return f"{self.times[frame] * factor:.{max(0, 2 - math.floor(math.log10(span)))}f} {unit}"
 
     def caption(self, frame: int) -> str:
-        """What is written in the corner of a picture."""
+        """The text in the corner of a picture."""
         return self.heading or f"t = {self.clock(frame)}     {self.scale_note()}"
 
     def scale_note(self) -> str:
@@ -270,7 +270,7 @@ def _require_rows(result: Result) -> None:
 def colouring(
     solids: Iterable[Solid], frames: int, colour: str, deflection: float, limit: float | None
 ) -> Colouring | None:
-    """What the name of a colour means for these bodies; None where there is nothing to show.
+    """The field that the name of a colour means for these bodies; None where there is nothing to show.
 
     Raises InputError for an unknown name, and for stress when no body has stress modes.
     """

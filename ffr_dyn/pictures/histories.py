@@ -169,7 +169,7 @@ def _largest(quantities: Iterable[Quantity]) -> float:
 
 
 def _common_word(result: Result, names: list[str]) -> str:
-    """What all the names speak of: the same quantity ("position") or the same owner ("energy"), or nothing."""
+    """The word that all names have in common: the same quantity ("position") or the same owner ("energy"), or nothing."""
     parts = [_owner(result, name).split(".") for name in names]
     for position in (-1, 0):
         words = {part[position] for part in parts}

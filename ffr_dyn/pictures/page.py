@@ -43,7 +43,7 @@ Item = dict[str, Any]
 
 @dataclass(frozen=True, eq=False)
 class Shown:
-    """What a page shows.
+    """The contents of a page.
 
     film     : the bodies at the rows
     beside   : joints, forces, markers at the same rows

@@ -89,7 +89,7 @@ def show(
 
 
 def drawn(seen: SceneView, path: str | Path | None = None, camera: Camera | None = None) -> Viewer:
-    """What `show` makes of a scene that was looked at."""
+    """The picture that `show` makes of a scene view."""
     target = None if path is None else Path(path)
     kind = target.suffix.lower() if target else ".html"
     if kind not in (".html", ".png"):

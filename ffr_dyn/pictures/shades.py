@@ -1,4 +1,4 @@
-"""What a page can colour bodies by, and how far the colours reach."""
+"""The fields by which a page can colour bodies, and their ranges."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What `ffr-dyn stress` tells of a result: hot spots in words, tables, histories and a coloured picture."""
+"""The report of `ffr-dyn stress` on a result: hot spots in words, tables, histories and a coloured picture."""
 
 from __future__ import annotations
 

@@ -141,7 +141,7 @@ def _time(stepper: Stepper, taken: Array, period: int, progress: Callable[[float
 
 
 def lines(timing: Timing) -> list[str]:
-    """What was measured, for people."""
+    """The measured times, in words."""
     t = timing
     verdict = {True: "holds", False: "does not hold"}
     return [

@@ -154,7 +154,7 @@ class Stepper(Brief):
         return self._outputs
 
     def doubts(self) -> list[str]:
-        """What is doubtful of the states at which this was asked, beside the notes of assembly: as the notes of `forward`
+        """Doubts about the states at which this was asked, beside the notes of assembly: as the notes of `forward`
         (the table in docs/analyses.md), but for the energy, and nothing is an error."""
         loop = self._loops[0]
         look(self._seen, View(loop.system, loop.record))

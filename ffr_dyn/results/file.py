@@ -362,7 +362,7 @@ class ResultWriter:
 
     @contextmanager
     def _explained(self) -> Iterator[None]:
-        """What HDF5 could not write leaves it a file that is of no use."""
+        """Explain a failure of HDF5 to write, which leaves a file that is of no use."""
         try:
             yield
         except (InputError, ComputationError):
@@ -486,7 +486,7 @@ def _write_stress(group: h5py.Group, point: h5py.Dataset, mode: h5py.Dataset, su
 def _write_second(
     group: h5py.Group, name: str, field: QuadraticField | None, unit: str, places: list[h5py.Dataset]
 ) -> None:
-    """What is quadratic in the elastic coordinates: sum over r of shapes_r (q . weights_r q) / 2."""
+    """Write the part that is quadratic in the elastic coordinates: sum over r of shapes_r (q . weights_r q) / 2."""
     if field is None or not field.weights.size:
         return
     own = group.create_group(name, track_order=True)

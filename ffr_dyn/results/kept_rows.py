@@ -1,4 +1,4 @@
-"""What a run keeps of its rows while it goes on: their quantities, or the rows themselves.
+"""The rows that a run keeps while it goes on: their quantities, or the rows themselves.
 
 Quantities of a short run are computed when they are first asked for, which few of them are: a study of ten thousand runs
 reads two or three of sixty. What a file is written of, what adds up over steps that are not kept, and long runs, whose rows

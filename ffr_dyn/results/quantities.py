@@ -267,7 +267,7 @@ def _reactions(system: System) -> Named:
 
 
 def _coupling_effort(coupling: Coupling, number: int) -> Entry:
-    """What a coupling does to its second coordinate; to the first it does -ratio times as much."""
+    """The effort of a coupling on its second coordinate; that on the first is -ratio times as large."""
     unit = "N m" if coupling.second.endswith(".angle") else "N"
     text = f"effort of the coupling along {coupling.second}; along {coupling.first} it is -ratio times that"
     return _entry(unit, (), text, lambda view: view.record.reaction[:, number, 0])
@@ -286,7 +286,7 @@ def _reaction(name: str, marker: int, joint: int | None, k: int, suffix: str) ->
 
 
 def _forces(system: System) -> Named:
-    """What is recorded of forces: where each stands and what it exerts."""
+    """The recorded quantities of forces: where each stands and what it exerts."""
     for k, force in enumerate(forces_of(system.scene)):
         for one in force.place.measured:
             yield f"{force.name}.{one.name}", _of_force(k, one)
@@ -303,7 +303,7 @@ def _of_force(k: int, one: Measured) -> Entry:
 
 
 def _sources(scene: Scene) -> list[Any]:
-    """What does work."""
+    """All that does work in a scene: forces, drivers, couplings."""
     return [*forces_of(scene), *scene.drivers, *(joint for joint in scene.joints if joint.kind == "distance")]
 
 

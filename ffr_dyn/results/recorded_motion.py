@@ -147,7 +147,7 @@ class View(Brief):
         return self._once(("pose", b), lambda: self._pose(b))
 
     def _once(self, what: Hashable, make: Callable[[], T]) -> T:
-        """What several quantities need is computed for the first of them."""
+        """The value of `make()`, which several quantities need, computed for the first of them."""
         if what not in self._known:
             self._known[what] = make()
         found: T = self._known[what]

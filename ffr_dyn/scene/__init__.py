@@ -1,1 +1,1 @@
-"""What is declared of a machine: bodies, joints, drivers, forces, sensors."""
+"""The declaration of a machine: bodies, joints, drivers, forces, sensors."""

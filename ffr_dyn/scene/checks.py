@@ -42,7 +42,7 @@ def check_marker(who: str, key: str, value: Any) -> None:
 
 
 def several(key: str, given: Any, kinds: tuple[Any, ...]) -> tuple[Any, ...]:
-    """What is given as a tuple; InputError unless it is several things of these kinds."""
+    """The given things as a tuple; InputError unless they are of these kinds."""
     if isinstance(given, (str, *kinds)):
         raise InputError(
             f"{key} is {type(given).__name__} {getattr(given, 'name', given)!r} alone; give a tuple, such as (it,)"

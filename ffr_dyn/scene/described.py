@@ -1,8 +1,10 @@
-"""What every result says of its scene: title, parts, and what connects which points, so that it can be drawn."""
+"""The description of the scene in every result: title, parts, and which points connections join, so that it can be drawn."""
 
 from __future__ import annotations
 
 from typing import Any
+
+import numpy as np
 
 from ffr_dyn.scene.drivers import Driver, PointDriver
 from ffr_dyn.scene.force_kinds import forces_of
@@ -17,13 +19,19 @@ _WITHOUT_AXIS = ("spherical", "fixed", "distance", "orientation")
 
 
 def described(scene: Scene) -> dict[str, Any]:
-    """Plain JSON values: the title; the parts of bodies by the name of the whole; places (3,) of the ground's points [m]; and
-    by the name of a joint, driver or force the markers `at` which it is, and what of it is drawn.
+    """Plain JSON values: the title; the `mass` [kg] of all bodies and a `length` [m], the largest radius of gyration about
+    the origin of a body's frame, which tell what is small; the parts of bodies by the name of the whole; places (3,) of the
+    ground's points [m]; and by the name of a joint, driver or force the markers `at` which it is, and what of it is drawn.
     """
     parts = {name: [part.name for part in of] for name, of in wholes(scene.bodies).items()}
     ground = {name: at.tolist() for name, at in scene.ground.items()}
-    found = {"parts": parts, "ground": ground, "connections": _connections(scene)}
+    sizes = {"mass": sum(body.model.mass for body in scene.bodies), "length": _length(scene)}
+    found = {**sizes, "parts": parts, "ground": ground, "connections": _connections(scene)}
     return {"title": scene.name} | {key: value for key, value in found.items() if value}
+
+
+def _length(scene: Scene) -> float:
+    return max((float(np.sqrt(np.trace(body.model.rr_dm) / body.model.mass)) for body in scene.bodies), default=0.0)
 
 
 def _connections(scene: Scene) -> dict[str, Any]:

@@ -15,7 +15,7 @@ WHAT = ("position", "velocity", "acceleration", "distance", "orientation")
 
 @dataclass(frozen=True)
 class Measurement:
-    """What marker `j` does, seen from marker `i` ("body.interface" or "ground.point").
+    """The motion of marker `j`, seen from marker `i` ("body.interface" or "ground.point").
 
     i, j : markers: j is seen from i
     what : position [m], velocity [m/s] or acceleration [m/s^2]: the difference of the two global vectors; distance [m];

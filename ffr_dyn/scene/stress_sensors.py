@@ -137,7 +137,7 @@ def _size(surface: Surface) -> float:
 
 @dataclass(frozen=True)
 class MeasuredModes:
-    """What a measurement of stress or section forces is made of: modes (k, n) per elastic coordinate, what is quadratic in
+    """The parts of a measurement of stress or section forces: modes (k, n) per elastic coordinate, what is quadratic in
     the coordinates besides, and how.
 
     of   : (T, k) -> (T, k) or (T,)

@@ -37,7 +37,7 @@ def assigned(source: Source, given: Mapping[str, str]) -> tuple[dict[str, Any], 
 
 
 def unknown(name: str, parameters: Mapping[str, Any], places: Mapping[str, Keys]) -> str:
-    """What to say of a name that is neither."""
+    """The message about a name that is neither."""
     close = get_close_matches(name, [*parameters, *(places if "." in name else ())], 1)
     such = next((place for place, keys in places.items() if len(keys) > 1), "gravity.2")
     known = f"there are: {', '.join(parameters) or 'none'}, and the entries of the file, such as {such}"

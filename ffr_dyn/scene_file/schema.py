@@ -1,4 +1,4 @@
-"""What a scene file may hold: models of its tables, made from the declarations of `ffr_dyn` themselves.
+"""The schema of scene files: models of its tables, made from the declarations of `ffr_dyn` themselves.
 
 A kind of joint, driver or force is a dataclass; its fields are the keys of its entry in the file. Forces say themselves how
 a file gives their fields. Another new kind is an entry in `tables`, and one in `FIELDS` for each of its fields whose type the
@@ -32,6 +32,7 @@ from ffr_dyn.analyses.registry import OverTime, analyses, analysis
 from ffr_dyn.analyses.settings import settings_of
 from ffr_dyn.functions.curves import Curve
 from ffr_dyn.integrators import CONTROLLED, METHODS, methods
+from ffr_dyn.integrators.stabilisation import Projection
 from ffr_dyn.scene import fields as said
 from ffr_dyn.scene import forces as _known_forces  # noqa: F401 - which makes them known
 from ffr_dyn.scene.couplings import Coupling
@@ -195,14 +196,14 @@ def _type(kind: Kind, f: Field[Any], hints: Mapping[str, Any]) -> Any:
 
 
 def _default(f: Field[Any]) -> Any:
-    """What stands for a key that is not given; None where the dataclass has no limit (JSON has no infinity)."""
+    """The default of a key; None where the dataclass has no limit (JSON has no infinity)."""
     if isinstance(f.default, tuple):
         return list(f.default)
     return None if f.default in (np.inf, -np.inf) else f.default
 
 
 def _given(hint: Any) -> Any:
-    """What a file gives for a field of this type, or where it is said more closely for that (`ffr_dyn.scene.fields`)."""
+    """The type of a key for a field of this type, or the closer one that the field declares (`ffr_dyn.scene.fields`)."""
     match hint:
         case said.In(unit):
             return Annotated[float, In(unit)]
@@ -341,7 +342,7 @@ class StabilisationEntry(Strict):
     """
 
     kind: Literal["projection", "baumgarte", "none"] = "projection"
-    tolerance: Annotated[float, In("m or rad or 1"), Key(gt=0)] = 1e-9
+    tolerance: Annotated[float, In("m or rad or 1"), Key(gt=0)] = Projection().tolerance
     alpha: Annotated[float, In("1/s"), Key(gt=0)] | None = None
     beta: Annotated[float, In("1/s"), Key(gt=0)] | None = None
 
@@ -353,7 +354,7 @@ class StabilisationEntry(Strict):
 
 
 class TolerancesEntry(Strict):
-    """What the error of a step may be: absolute values, plus `relative` of each coordinate's size; see `Tolerances`.
+    """Tolerances of the error of a step: absolute values, plus `relative` of each coordinate's size; see `Tolerances`.
 
     relative : of each coordinate's size [-]
     position : absolute, of points [m] and rotations [rad]
@@ -479,7 +480,7 @@ def _bare_key(f: Field[Any], hint: Any) -> tuple[Any, Any]:
 
 
 class _ChartEntry(Strict):
-    """What `ffr-dyn chart` compares: steps [s] or tolerances by method, empty lists where they are to be chosen.
+    """The variants that `ffr-dyn chart` compares: steps [s] or tolerances by method, empty lists where they are to be chosen.
 
     measures : what the error is of, such as "deflection:rod"; default: those that fit the scene
     methods : steps [s] or tolerances for each method; an empty list where they are to be chosen; default: all methods

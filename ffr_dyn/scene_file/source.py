@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -46,12 +47,23 @@ def origin(source: Source, keys: tuple[str, ...]) -> str:
 
 
 def origin_of_name(source: Source, message: str) -> str:
-    """File and line of the entry that a complaint names first, in quotes; of the file where it names none."""
+    """File and line of the entry that a complaint names first, in quotes, or whose value it is; else the file alone."""
     for name in re.findall(r"'([^']+)'", message):
         for table, entries in source.tree.items():
             if table != "parameters" and isinstance(entries, dict) and name in entries:
                 return origin(source, (table, name))
+        if keys := next(_paths_to(source.tree, name), None):
+            return origin(source, keys)
     return origin(source, ())
+
+
+def _paths_to(tree: dict[str, Any], text: str, keys: tuple[str, ...] = ()) -> Iterator[tuple[str, ...]]:
+    """The keys of the entries whose value is a text."""
+    for key, item in tree.items():
+        if isinstance(item, dict):
+            yield from _paths_to(item, text, (*keys, key))
+        elif item == text:
+            yield (*keys, key)
 
 
 def _lines(path: Path) -> dict[tuple[str, ...], int]:

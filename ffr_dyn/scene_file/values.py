@@ -143,7 +143,7 @@ def _form(value: Any) -> str | None:
 
 
 def _expression(value: float | str | FunctionEntry, info: ValidationInfo) -> Expression:
-    """What a number, a formula or a table of the file means."""
+    """The expression that a number, a formula or a table of the file means."""
     parameters = parameters_of(info)
     if isinstance(value, FunctionEntry) and value.formula is not None:
         value = value.formula

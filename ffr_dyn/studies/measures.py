@@ -1,4 +1,4 @@
-"""What a run is reduced to: numbers of its outputs, or whole histories.
+"""The measures of a run: numbers of its outputs, or whole histories.
 
 "rod.tip.position.x: range"    last, first, least, greatest, largest (of absolute values), mean, rms, range of a quantity;
                                of one with several components the largest of them, its length for largest and rms
@@ -150,7 +150,7 @@ def _entered(found: Any, path: str) -> tuple[str, Any, str]:
 
 
 def _names(found: Any) -> dict[str, Any]:
-    """What could have been named in an entry."""
+    """The names that could have been meant in an entry."""
     if isinstance(found, list):
         return dict.fromkeys(str(k + 1) for k in range(len(found)))
     return found if isinstance(found, dict) else {}

@@ -204,7 +204,7 @@ def _are_numbers(given: Sequence[Any]) -> bool:
 
 
 def _values(name: str, given: Any) -> Axis | Spread:
-    """What a parameter takes. Raises InputError for what says no values."""
+    """The values of a parameter. Raises InputError for an entry without any."""
     if isinstance(given, (Axis, Spread)):
         return given
     if isinstance(given, str) or _are_numbers([given]):
@@ -330,7 +330,7 @@ def recipe(made: Study, body: str, point: Mapping[str, Value]) -> str:
 
 
 def mark(made: Study) -> str:
-    """What tells a study from another: its points, outputs and recipes, and the text of its scene."""
+    """The mark that tells a study from another: its points, outputs and recipes, and the text of its scene."""
     whole = [
         [sorted(point.items()) for point in made.points],
         [[one.name, one.quantity, one.how] for one in made.outputs],

@@ -55,7 +55,7 @@ class Task:
 
 @dataclass(frozen=True)
 class Row:
-    """What came of a run: its numbers and histories, or why there are none."""
+    """The outcome of a run: its numbers and histories, or why there are none."""
 
     number: int
     values: Mapping[str, Number]

@@ -51,7 +51,7 @@ class Crew:
             yield number, outcome
 
     def _done(self, function: Callable[[Item], Any], item: Item, say: Say) -> Any:
-        """What a worker makes of an item, or another one where it dies."""
+        """The result of a worker for an item, or of another one where it dies."""
         for _ in range(RETRIES + 1):
             worker = self._idle.get()
             try:

@@ -128,7 +128,7 @@ def _form_in_plane(
 
 
 def _ratios(body: Body) -> bytes:
-    """What of the damping of a body tells double modes apart: nothing where all ratios are one."""
+    """The part of the damping of a body that tells double modes apart: empty where all ratios are one."""
     return body.damping.tobytes() if np.ptp(body.damping) else b""
 
 
@@ -136,7 +136,7 @@ def _ratios(body: Body) -> bytes:
 
 
 def _across(scene: Scene, normal: int) -> Iterator[str]:
-    """What makes a planar motion impossible, in words."""
+    """The reasons why a planar motion is impossible, in words."""
     if abs(scene.gravity[normal]) > _NOTHING * np.linalg.norm(scene.gravity):
         yield f"gravity has the component {scene.gravity[normal]:g} m/s^2 along it"
     if not is_zero(scene.base_acceleration[normal]):
@@ -144,7 +144,7 @@ def _across(scene: Scene, normal: int) -> Iterator[str]:
     for body in scene.bodies:
         k = body_normal(body, normal)
         if k < 0:
-            yield f"no axis of body {body.name!r} is along it"
+            yield f"no axis of the frame of body {body.name!r} is along it"
         elif body.velocity.any() and abs(body.velocity[normal]) > _NOTHING * np.linalg.norm(body.velocity):
             yield f"body {body.name!r} starts with a velocity along it"
         elif not body.omega_bar.any():
@@ -157,13 +157,13 @@ def _across(scene: Scene, normal: int) -> Iterator[str]:
 
 
 def _obstacles(scene: Scene, normal: int) -> Iterator[str]:
-    """What makes a planar motion impossible, may take it out of the plane, or makes reactions that it does not have."""
+    """The reasons why a planar motion is impossible, may leave the plane, or has reactions across it."""
     yield from _across(scene, normal)
     yield from _leaving(scene, normal)
 
 
 def _leaving(scene: Scene, normal: int) -> Iterator[str]:
-    """What may take the motion out of the plane, or makes reactions that a planar scene does not have."""
+    """The loads that may take the motion out of the plane, or make reactions that a planar scene does not have."""
     if any(f.name not in _KNOWN and getattr(scene, f.name) for f in fields(scene)):
         yield "there are forces of other kinds"
     for body in scene.bodies:
@@ -183,7 +183,7 @@ def _leaving(scene: Scene, normal: int) -> Iterator[str]:
 
 
 def _asymmetry(part: Body, k: int, used: tuple[str, ...]) -> str:
-    """What of in-plane motion excites something across body axis k, rigid or elastic, in words; "" of a symmetric body."""
+    """The in-plane motion that excites something across body axis k, rigid or elastic, in words; "" of a symmetric body."""
     key = "asymmetry", k, used, part.stiffening, _ratios(part) if part.model.n else b""
     return remembered(part.model, key, lambda: _found_asymmetry(part, k, used))
 
@@ -194,7 +194,7 @@ def _found_asymmetry(part: Body, k: int, used: tuple[str, ...]) -> str:
     places = {"its centre of mass": body.centre_of_mass[k]} | {name: body.interface(name).position[k] for name in used}
     off = max(places, key=lambda name: abs(places[name]))
     if abs(places[off]) > BESIDE * length:
-        return f"{off} is {places[off]:.3g} m beside its middle plane"
+        return f"{off} is {abs(places[off]):.3g} m off the plane through the origin of its frame"
     products = max(abs(body.rr_dm[k, c]) for c in range(3) if c != k) / (body.mass * length**2)
     if products > BESIDE:
         return f"a product of inertia is {products:.2g} of its moments"

@@ -208,7 +208,7 @@ def vary(
 
 
 def _by_name(given: Any, everywhere: Iterable[str], names: list[str]) -> dict[str, Any]:
-    """What is given by name, or for all that it concerns."""
+    """The values by name of a setting that is given by name, or once for all that it concerns."""
     if isinstance(given, Mapping):
         return dict(_known(given, names))
     return dict.fromkeys(everywhere, given)

@@ -78,7 +78,7 @@ def _arrays(body: FlexibleBody) -> dict[str, Array]:
 
 
 def _described(body: FlexibleBody) -> dict[str, Any]:
-    """What the header says of a body."""
+    """The description of a body in the header of its file."""
     return {
         "name": body.name,
         "mass": body.mass,

@@ -16,7 +16,7 @@ def mesh_errors_of(provenance: Mapping[str, Any]) -> dict[int, float]:
 
 
 def mesh_doubt(provenance: Mapping[str, Any]) -> str | None:
-    """What is said of a body whose lowest frequency the mesh makes too high."""
+    """The warning about a body whose lowest frequency the mesh makes too high; None where there is none."""
     first = mesh_errors_of(provenance).get(1, 0.0)
     if first < TOLD:
         return None

@@ -1,4 +1,4 @@
-"""What a reduced body is: its arrays, their views, and what they must satisfy."""
+"""The reduced body: its arrays, their views, and the conditions that they satisfy."""
 
 from __future__ import annotations
 
@@ -104,7 +104,7 @@ class BeamForces(Brief):
 
 @dataclass(frozen=True, repr=False)
 class Surface(Brief):
-    """What is drawn and where fields are recovered: a triangulated boundary with the basis at its points.
+    """The triangulated boundary with the basis at its points: for drawing, and where fields are recovered.
 
     points : (P, 3) [m] undeformed; triangles : (T, 3) indices into points; Phi : (P, 3, n) [1/sqrt(kg)]
     second : second-order displacement of the points, in all Phi q + second(q); None where it was not computed
@@ -368,7 +368,7 @@ class _Memory(dict[Hashable, Any]):
 
 
 def remembered(body: FlexibleBody, key: Hashable, make: Callable[[], T]) -> T:
-    """What `make` makes of a body and of nothing but it and `key`; of the same body and key the same thing.
+    """The value of `make()`, which depends on the body and `key` alone, computed once for each.
 
     For what many scenes ask of one body: its forms in a plane, its tables. It lives as long as the body.
     """

@@ -144,7 +144,7 @@ def _mesh_settings(options: Mapping[str, Any]) -> dict[str, Any]:
 @cli.command(cls=NotesCommand, registries=(MESH_FORMATS,), epilog="\b\nFormats:\n{mesh format}")
 @_MESH
 def mesh(mesh: Path, **options: Any) -> None:
-    """What MESH holds: elements, extent, and the names of surfaces, node sets and volumes; and whether it is sound."""
+    """Elements, extent, names of surfaces, node sets and volumes of MESH; and whether it is sound."""
     from ffr_prep.mesh.mesh import check_mesh, read_mesh
     from ffr_prep.report.text import mesh_lines
 
@@ -237,7 +237,7 @@ def reduce(mesh: Path, materials: tuple[str, ...], regions: tuple[str, ...], **o
 )
 @click.option("-o", "--output", type=OUTPUT_FILE, help="Write the integrals, or those of --terms, to this .npz file.")
 def info(body: Path, terms: tuple[str, ...], output: Path | None) -> None:
-    """What BODY is: mass, inertia, interfaces, frequencies, inertia integrals, what it can represent, how it was made.
+    """Describe BODY: mass, inertia, interfaces, frequencies, inertia integrals, what it can represent, how it was made.
 
     The effective mass of a mode is the part of the mass that it sets in motion when the frame is shaken along an axis;
     modes with little of it matter little for inertia loads. With the mean-axis frame all of them are zero.

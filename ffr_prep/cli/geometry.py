@@ -65,7 +65,7 @@ def _settings(options: Mapping[str, Any]) -> dict[str, Any]:
 def faces_command(
     part: Path, regions: tuple[str, ...], as_json: bool, picture: Path | None, page: Path | None, **options: Any
 ) -> None:
-    """What faces PART has: kind, radius, axis, place, area, name and colour, and what to type for each.
+    """List the faces of PART: kind, radius, axis, place, area, name and colour, and what to type for each.
 
     PART is a CAD file (.step, .iges, .brep), a script of gmsh (.geo), or a mesh, on whose skin planes, cylinders and spheres
     are recognised. A bore that is several faces is one line.

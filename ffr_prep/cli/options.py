@@ -1,4 +1,4 @@
-"""What the arguments of ffr-prep say: numbers, materials, interfaces, reference conditions, files to write.
+"""Parsing of the arguments of ffr-prep: numbers, materials, interfaces, reference conditions, files to write.
 
 Heavy modules are imported where they are needed, so that help is immediate. Every function raises InputError, naming the
 option and what it may be.

@@ -1,4 +1,4 @@
-"""What ffr-prep tells at the terminal: the steps of the work, how far they are, and what came out."""
+"""Messages of ffr-prep at the terminal: the steps of the work, their progress, and the outcome."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""What both packages share: errors, units, progress."""
+"""Shared by both packages: errors, units, progress."""

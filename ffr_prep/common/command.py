@@ -1,4 +1,4 @@
-"""What the commands of both packages share: how they end, which files they read, and which they may write."""
+"""Shared by the commands of both packages: how they end, which files they read, and which they may write."""
 
 from __future__ import annotations
 
@@ -101,7 +101,7 @@ def run_command(group: click.Group, program: str, arguments: Sequence[str] | Non
 
 
 def _last_words(program: str, error: Exception) -> tuple[str, int]:
-    """What is said of an error, and the exit code."""
+    """The last line that a command prints for an error, and its exit code."""
     if isinstance(error, InputError):
         return str(error), 2
     if isinstance(error, ComputationError):

@@ -1,4 +1,4 @@
-"""What a docstring says of each name: its lists "name : meaning", from which schemas and pages are made.
+"""The lists "name : meaning" of a docstring, from which schemas and pages are made.
 
 An item is `name : text` or `name, other : text` at the margin of the docstring; lines that are indented further go on with
 it. Two items may share a line, with `;` and two spaces between them.

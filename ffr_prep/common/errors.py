@@ -2,7 +2,7 @@
 
 
 class InputError(ValueError):
-    """What the user gave cannot be used. The message names the thing, its value and the remedy.
+    """Input that cannot be used. The message names the thing, its value and the remedy.
 
     >>> try: rod = fd.load_body("rod.ffr")
     ... except fd.InputError as error: print(error)

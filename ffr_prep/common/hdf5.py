@@ -40,7 +40,7 @@ def abandon(file: Any) -> None:
 
 
 def why(error: BaseException) -> str:
-    """What the system says of a failure, without the library's account of its own state."""
+    """The reason that the system gives for a failure, without the HDF5 library's account of its own state."""
     number = getattr(error, "errno", None)
     return os.strerror(number) if number else str(error)
 

@@ -76,7 +76,7 @@ def _lost() -> list[int]:
 
 
 def ignore_further() -> None:
-    """What ends already is not ended again."""
+    """From now on ignore signals that would end a process which is ending already."""
     if threading.current_thread() is threading.main_thread():
         for number in _ENDING:
             signal.signal(number, signal.SIG_IGN)

@@ -41,7 +41,7 @@ def _since_the_start() -> int | None:
 
 
 def left() -> int | None:
-    """What this process can still take without swapping [bytes]; None where that is not known (not Linux)."""
+    """Memory that this process can still take without swapping [bytes]; None where that is not known (not Linux)."""
     sizes = []
     with contextlib.suppress(OSError, KeyError, ValueError):
         lines = dict(line.split(":", 1) for line in _MACHINE.read_text().splitlines())
@@ -54,7 +54,7 @@ def left() -> int | None:
 
 
 def give_back() -> None:
-    """What was freed in small pieces goes back to the system, where the C library can (glibc): large arrays never use it."""
+    """Return freed small blocks of memory to the system, where the C library can (glibc): large arrays never use them."""
     with contextlib.suppress(OSError, AttributeError, TypeError):
         ctypes.CDLL(None).malloc_trim(0)
 

@@ -47,5 +47,5 @@ def _array(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> Array:
 
 
 def _most(member: zipfile.ZipInfo) -> int:
-    """What the packed bytes can hold at most: deflate packs no better than 1032 to 1."""
+    """The largest size that the packed bytes can unpack to: deflate packs no better than 1032 to 1."""
     return 1032 * member.compress_size + 1024

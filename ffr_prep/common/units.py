@@ -117,6 +117,13 @@ def to_si(value: float, unit: str, expected: str | None = None) -> float:
     return value * factor
 
 
+def natural(unit: str, mass: float, length: float, time: float) -> float:
+    """One of an SI unit made of a mass [kg], a length [m] and a time [s]: of "N" mass length / time^2."""
+    roots = unit.count("sqrt(kg)")  # of elastic coordinates
+    kg, m, s, _ = _parsed(unit.replace("sqrt(kg)", "1"))[1]
+    return mass ** (kg + 0.5 * roots) * length**m * time**s
+
+
 def _parsed(unit: str) -> tuple[float, Dimension]:
     factor, powers, at = 1.0, [0, 0, 0, 0], 0
     while at < len(unit):

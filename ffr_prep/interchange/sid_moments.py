@@ -61,7 +61,7 @@ class FirstMoments:
         return {"plane": "xyz"[self.normal]}
 
     def warnings(self) -> list[str]:
-        """What no motion out of the plane of the model has."""
+        """The blocks that a planar model leaves zero: those of motions out of its plane."""
         if self.normal is None:
             return []
         name = "xyz"[self.normal]

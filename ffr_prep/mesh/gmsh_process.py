@@ -37,7 +37,7 @@ _CAD = (".step", ".stp", ".brep", *_IGES)
 
 
 class RefusedError(Exception):
-    """What is asked for cannot be meant; the message says why, and what to ask for."""
+    """A request that cannot be meant; the message says why, and what to ask for."""
 
 
 def main() -> int:

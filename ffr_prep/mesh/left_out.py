@@ -1,4 +1,4 @@
-"""What mesh decks hold beside solids that would change a body: nothing of it is passed over without a word.
+"""Cards of mesh decks beside solids that would change a body: each is read, reported or refused.
 
 A mesh becomes a body of solid elements alone. What else has stiffness, mass or damping, holds parts together or holds them
 fast is told with the place where it belongs: the scene, a structure file, interfaces, the matrices of the whole.

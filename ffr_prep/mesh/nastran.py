@@ -30,7 +30,7 @@ _DEEPEST = 40
 
 @dataclass
 class _Deck:
-    """What a file defines, by number."""
+    """The definitions of a bulk data file, by number."""
 
     grids: dict[int, Card] = field(default_factory=dict)
     systems: dict[int, Card] = field(default_factory=dict)

@@ -29,7 +29,7 @@ _FACES = {
 
 @dataclass(frozen=True)
 class _Elements:
-    """What scikit-fem asks of a mesh and of its degrees of freedom, for elements (or faces) of one kind.
+    """The mesh and degrees of freedom of elements (or faces) of one kind, in the form that scikit-fem asks for.
 
     doflocs : (3, N) nodes [m]; element_dofs : (k, E) nodes of the elements in scikit-fem's local order
     """

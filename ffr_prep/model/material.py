@@ -307,7 +307,7 @@ KEYS = {
 
 
 def material_keys() -> dict[str, tuple[set[str], set[str]]]:
-    """What a material file may hold: for each kind of material the keys that it must have and those that it may have."""
+    """The keys of a material file: for each kind of material the required ones and the optional ones."""
     kinds = ("Anisotropic", "Orthotropic", "Isotropic")
     return {kind: (form[1], form[2] | {"name"}) for kind, form in zip(kinds, _FORMS, strict=True)}
 

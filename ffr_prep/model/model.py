@@ -19,7 +19,7 @@ from ffr_prep.model.second_order import SecondOrder
 
 @dataclass(frozen=True, repr=False)
 class Model(Brief):
-    """What a reduction needs of a model, whatever its elements are; z are the independent coordinates of `coupled`.
+    """The interface between a model and its reduction, for all elements; z are the independent coordinates of `coupled`.
 
     coupled    : stiffness, mass, interfaces and inertial loads
     inertia    : inertia integrals of a basis (Z, n)

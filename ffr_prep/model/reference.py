@@ -29,7 +29,7 @@ _RANK = 1e-9
 
 
 class ReferenceConditions(Protocol):
-    """What every choice of reference conditions offers."""
+    """The protocol of all reference conditions."""
 
     def rows(self, model: CoupledModel) -> Array:
         """(r, Z) functionals on the independent coordinates."""

@@ -1,4 +1,4 @@
-"""What the regions of interfaces add to geometric stiffness: their rotation to second order.
+"""The part of geometric stiffness that comes from the regions of interfaces: their rotation to second order.
 
 Geometric stiffness is the second order of the work of stress and loads, so it needs the displacements to second order.
 Those of free nodes are coordinates themselves. A region that an interface moves as one piece turns by the rotation vector

@@ -1,4 +1,4 @@
-"""What follows interfaces: the independent coordinates of a model, and the coordinates of interfaces in them.
+"""Coordinates that follow interfaces, the independent coordinates of a model, and the coordinates of interfaces in them.
 
 Rows are coordinates of nodes, however many a node has. Those that follow a rigid interface are replaced by its six.
 """

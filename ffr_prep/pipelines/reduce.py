@@ -36,7 +36,7 @@ UNDAMPED = Damping()
 
 @dataclass(frozen=True, kw_only=True)
 class Request:
-    """What is wanted of a model.
+    """A reduction of a model: conditions, shapes, and what else is computed.
 
     name       : of the body
     reference  : how its frame is attached, such as FixedTo("root") or MeanAxis(); an interface may be said by where it is,

@@ -108,7 +108,7 @@ def _together(solids: Sequence[FileSolid]) -> FileSolid:
 
 
 def _integrated(mesh: Mesh) -> FileSolid:
-    """What the elements enclose, curved ones as well."""
+    """Mass properties of the volume of the elements, curved ones included."""
     m = assemble(mesh, Material("of density one", 1.0, 0.0, 1.0)).m
     found = inertia_integrals(mesh.points, m, np.zeros((len(mesh.points), 3, 0)))
     second = found.rr_dm - np.outer(found.r_dm, found.r_dm) / found.mass

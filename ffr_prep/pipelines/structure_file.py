@@ -67,7 +67,7 @@ from ffr_prep.structures.sections import Section, circle, general, i_section, re
 
 @dataclass(frozen=True)
 class Structure:
-    """What a structure file holds: a frame with its interfaces, solids tied to it, and how they are reduced together.
+    """The contents of a structure file: a frame with its interfaces, solids tied to it, and how they are reduced together.
 
     solids : by name, the mesh, its material or one for each volume, and its interfaces
     ties   : pairs of interfaces "part.interface" that are joined; the frame is the part "frame"

@@ -91,7 +91,7 @@ class MaterialEntry(Strict):
 
 
 class MemberEntry(Strict):
-    """What beams are made of.
+    """Section, material and orientation of beams.
 
     section : shape and size
     material : a name of [materials] or of the library
@@ -108,7 +108,7 @@ class MemberEntry(Strict):
 
 
 class ShellEntry(Strict):
-    """What plates are made of.
+    """Thickness and material of plates.
 
     thickness : of the plate [m]
     material : a name of [materials] or of the library

@@ -124,7 +124,7 @@ def _through_ties(
     static: Array | sp.csr_array,
     loads: Array,
 ) -> tuple[list[tuple[Array, sp.csr_array]], list[Array]]:
-    """What each tie carries as (r, 3, 3) force f_a times arm d_b, with the rotation (3, Z) of its arm, and for each part
+    """The reactions of each tie as (r, 3, 3) force f_a times arm d_b, with the rotation (3, Z) of its arm, and for each part
     the amplitudes (12 + 6 I, r) of its known loads, which are those of the body and of its ties.
 
     The dependent side of a tie is pulled by what its stiffness and its other loads ask for; the other side by the opposite.

@@ -1,4 +1,4 @@
-"""What the size of the elements adds to the frequencies of a reduced body."""
+"""The error of the frequencies of a reduced body that comes from the size of the elements."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""What a body is: in words, numbers and pictures."""
+"""Descriptions of a body: in words, numbers and pictures."""

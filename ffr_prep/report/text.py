@@ -1,4 +1,4 @@
-"""What a mesh or a reduced body is, in words and numbers for a reader at the terminal."""
+"""Descriptions of a mesh or a reduced body, in words and numbers, for the terminal."""
 
 from __future__ import annotations
 
@@ -169,7 +169,7 @@ def damping_lines(body: FlexibleBody) -> Iterator[str]:
 
 
 def verification_lines(provenance: Mapping[str, Any]) -> Iterator[str]:
-    """What was found of the normal modes, where somebody asked (`Solver.verify`)."""
+    """The result of the verification of the normal modes, where it was asked for (`Solver.verify`)."""
     if found := provenance.get("normal_modes"):
         below = np.sqrt(found["below"]) / (2 * np.pi)
         yield (
@@ -179,7 +179,7 @@ def verification_lines(provenance: Mapping[str, Any]) -> Iterator[str]:
 
 
 def ability_lines(body: FlexibleBody) -> Iterator[str]:
-    """What the elastic coordinates can represent and what they cannot."""
+    """Motions that the elastic coordinates can represent, and those that they cannot."""
     if not body.n:
         yield "ability     a rigid body: it does not deform"
         return
@@ -205,7 +205,7 @@ def _range_in_words(body: FlexibleBody) -> str:
 
 
 def _kept(reduction: Mapping[str, Any], n: int) -> Any:
-    """What was asked of the number of normal modes: by a reduction, or by the first part of a union that has any."""
+    """The number of normal modes that was asked for: by a reduction, or by the first part of a union that has any."""
     parts = [part for part in reduction.get("parts", [reduction]) if "modes" in part]
     return parts[0]["modes"] if parts else 0 if "type" in reduction else n
 

@@ -54,7 +54,7 @@ def _part(mesh: Mesh, division: Division, k: int) -> Mesh:
 
 
 def _filled(groups: Mapping[str, Array]) -> dict[str, Array]:
-    """What of each group is there (not -1), where something is."""
+    """Each group without the entries that are missing (-1), and only the groups with any left."""
     return {name: of[of >= 0] for name, of in groups.items() if (of >= 0).any()}
 
 

@@ -112,7 +112,7 @@ def nodal_basis(model: CoupledModel, basis: Basis) -> Array:
 
 
 def mesh_warnings(mesh: Mesh) -> list[str]:
-    """What makes the results of this mesh doubtful, in words."""
+    """Doubts about the results of this mesh, in words."""
     counts = element_counts(mesh)
     if "tet4" not in counts:
         return []

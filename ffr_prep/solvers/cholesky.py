@@ -169,7 +169,7 @@ class Analysis:
 
 
 def analysed(A: sp.csr_array, positions: Array, held: Array = NOTHING) -> Analysis:
-    """What is known of the elimination of A (n, n) before any number is; the others as of `cholesky`."""
+    """The symbolic factorisation of A (n, n): its structure, without numbers; the other arguments as of `cholesky`."""
     pieces, below = elimination_tree(A, positions, held)
     order = np.concatenate(pieces)
     place = np.full(len(positions), -1, np.int32)
@@ -289,7 +289,7 @@ def _eliminate_branches(
 
 
 def workspace(fronts: Fronts, runs: Array, unknowns: int) -> Workspace:
-    """What the elimination of any of the runs (t, 2), first and last front, needs."""
+    """The workspace that the elimination of any of the runs (t, 2), first and last front, needs."""
     panel, update, waiting_updates = map(np.empty, _most(fronts, runs))
     return Workspace(panel, update, waiting_updates, np.empty(unknowns, np.int32))
 
@@ -297,7 +297,7 @@ def workspace(fronts: Fronts, runs: Array, unknowns: int) -> Workspace:
 def on_branches(
     work: Callable[..., Made], fronts: Fronts, division: Division, matrix: Sorted, each: Map
 ) -> Iterable[Made]:
-    """What the work makes of each branch in a workspace, of which there is one for each thread."""
+    """The results of the work on each branch, in a workspace of which there is one for each thread."""
     spaces: SimpleQueue[Workspace] = SimpleQueue()
     for _ in range(_at_work(division)):
         spaces.put(workspace(fronts, division.branches, len(matrix.place)))

@@ -50,7 +50,7 @@ _REMEDY = "look for parts joined by a single node or edge, or materials of extre
 
 @dataclass(frozen=True)
 class Solver:
-    """What factorises the stiffness and finds the modes.
+    """The method that factorises the stiffness and finds the modes.
 
     name  : "cholesky" (this package's own), "superlu" (SciPy's, slow but with no compiled code of ours), "pardiso" (Intel
             MKL, if pypardiso is installed) or "slepc" (SLEPc and MUMPS in processes of their own, under MPI)

@@ -87,7 +87,7 @@ def _bordered(T: Array, columns: Array) -> Array:
 
 
 def _orthonormal(vectors: Array, Q: SearchSpace, M: sp.csr_array, last: list[Array]) -> tuple[Array, Array, Array]:
-    """What the vectors (Z, b) add to Q: an M-orthonormal basis, M times it, and the coordinates Q^T M of the vectors.
+    """The extension of the search space Q by vectors (Z, b): an M-orthonormal basis, M times it, Q^T M of the vectors.
 
     But for rounding the vectors are coupled to the last vectors of Q alone, M times which is given in blocks. These parts
     are taken out first; then nothing large is left that a single pass over all of Q would have to take out.

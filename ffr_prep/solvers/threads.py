@@ -42,7 +42,7 @@ def threads() -> Iterator[Map]:
 
 
 def ahead(function: Callable[[Given1], Made], items: Iterable[Given1]) -> Iterator[Made]:
-    """What the function makes of each item, in their order, on all threads; few at a time wait to be taken."""
+    """The results of the function for each item, in order, computed on all threads; few at a time wait to be taken."""
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         waiting: deque[Future[Made]] = deque()
         for item in items:

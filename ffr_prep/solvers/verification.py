@@ -27,7 +27,7 @@ _LARGEST = 1e-8  # residual; searches end at 1e-9, and rounding is beside it
 
 @dataclass(frozen=True)
 class Verification:
-    """What was found of the normal modes of a body.
+    """The outcome of the verification of the normal modes of a body.
 
     residuals : (p,) of each mode, relative
     below     : squared frequency [rad^2/s^2] below which modes were counted

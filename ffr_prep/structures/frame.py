@@ -32,7 +32,7 @@ _FAR = 1e100  # m; squares of coordinates must be finite
 
 @dataclass(frozen=True)
 class Member:
-    """What a beam is made of.
+    """Section, material and orientation of a beam.
 
     orientation : vector (body axes) that lies in the x'y' plane of the elements, so that y', the direction of the
                   section's height, is its part across the beam; a round section needs none
@@ -55,7 +55,7 @@ class Member:
 
 @dataclass(frozen=True)
 class Shell:
-    """What a plate is made of.
+    """Thickness and material of a plate.
 
     thickness : [m], half of it on either side of the nodes
     gyration  : root mean square of the distance of the mass from the middle plane [m]; thickness/sqrt(12) when not given,

@@ -268,7 +268,7 @@ def _residual(of: Plant, times: Array, path: Path, h: float) -> tuple[list[Look]
 
 
 def _boundary(path: Path, first: _End, last: _End, h: float) -> Array:
-    """What shall vanish at the ends, in the mean square: see `_linear`."""
+    """The boundary conditions at both ends, whose residuals vanish in the mean square: see `_linear`."""
     rates = _velocities(path.y, path.a, h)
     start, end = (np.concatenate([path.y[k] - at.y, rates[k]]) for k, at in ((0, first), (-1, last)))
     smooth = np.diff(FAINT * h**2 * _effect(first) * path.u, n=3, axis=0)

@@ -1,4 +1,4 @@
-"""What known motions leave free of a linearised plant, by differentiating them until the efforts appear.
+"""The internal dynamics of a linearised plant under known motions, by differentiating them until the efforts appear.
 
 With z = (y, y_dot), z_dot = F z + G u, known motions C z = 0: of the derivatives C F z + C G u those combinations without u
 are known in turn, as often as it takes; the others give u. (Silverman, IEEE Transactions on Automatic Control
@@ -132,7 +132,7 @@ def _unfit(of: Plant, at: Slopes, found: Internal, x: Array, labels: list[str]) 
 
 
 def _moved(of: Plant, y_ddot: Array, x: Array) -> str:
-    """What accelerations y_ddot (D,) at rest do to the joint coordinates, the largest first, and to the coordinates y."""
+    """The effect of accelerations y_ddot (D,) at rest on joint coordinates, the largest first, and on the coordinates y."""
     own, place = of.own, of.own.at.system.layout
     names, gradients = coordinate_gradients(own.at.system.scene, place, x, np.zeros(place.v_size))
     moved = np.concatenate([gradients @ (motions(of, own.span[0], x) @ y_ddot), y_ddot[own.inner.size :]])

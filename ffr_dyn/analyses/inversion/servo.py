@@ -90,7 +90,7 @@ class Moment:
 def servo(
     assembled: Assembled, known: tuple[str, ...], unknown: tuple[Effort, ...], span: tuple[float, float]
 ) -> ServoMotion:
-    """What the known motions leave free, in internal coordinates chosen at the assembled state, by rank.
+    """The motions that the known ones leave free, in internal coordinates chosen at the assembled state, by rank.
 
     Raises InputError where joint and elastic coordinates do not describe it.
     """

@@ -251,7 +251,7 @@ def _losses(frequency: Array, growth: Array, turns: Sequence[tuple[int, float]])
 
 
 def forced_lines(result: Result) -> list[str]:
-    """What a command tells: the branch, every output at its largest, jumps, losses of stability."""
+    """The report of the command: the branch, the maximum of every output, jumps, losses of stability."""
     a, f = result.attributes, result["frequency"]
     lines = [
         f"input        {a['input']}, amplitude {a['input_amplitude']:g}; {f.size} motions from {f[0]:.5g} to {f[-1]:.5g} Hz"

@@ -18,7 +18,7 @@ ROWS = 48
 
 
 class Modes(Protocol):
-    """What is asked of a `ffr_dyn.analyses.linearise.Linearisation`."""
+    """The part of a `ffr_dyn.analyses.linearise.Linearisation` that is used here."""
 
     @property
     def eigenvalues(self) -> Array: ...

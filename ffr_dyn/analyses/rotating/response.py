@@ -254,7 +254,7 @@ def _undamped(found: Transfer, psd: tuple[Any, ...]) -> list[str]:
 
 
 def response_lines(result: Result) -> list[str]:
-    """What a command tells: every output at rest and at its largest, the modes that do most there, and the rms."""
+    """The report of the command: every output at rest and at its maximum, the modes that do most there, the rms."""
     a, f, gain = result.attributes, result["frequency"], result["gain"]
     lines = [f"input        {a['input']}, {f.size} frequencies from {f[0]:.4g} to {f[-1]:.4g} Hz"]
     parts = result["parts"] @ np.array([1, 1j]) if len(a["modes"]) else np.zeros((f.size, gain.shape[1], 0))

@@ -51,7 +51,7 @@ def seen_from_ground(
 
 
 def beside(of: Turned, frequencies: Array, outputs: Sequence[str]) -> list[str]:
-    """What is told of outputs that answer at other frequencies than that of the input."""
+    """Notes on outputs that answer at other frequencies than that of the input."""
     C, D = of.beside
     H = transfer(of.A, of.B, C, D, frequencies, 0).H.reshape(frequencies.size, -1, 2, len(outputs))
     own = np.abs(transfer(of.A, of.B, of.C, of.D, frequencies, 0).H).max(axis=0)

@@ -121,7 +121,7 @@ def _number(text: str) -> float:
 
 
 def growing(found: Found) -> str:
-    """What grows about a steady motion, in words; "" where nothing does."""
+    """The unstable modes about a steady motion, in words; "" where there are none."""
     one = spectrum(found)
     faster = one.values.real > GROWS * np.maximum(np.abs(one.values), 1e-300)
     if not faster.any():

@@ -104,7 +104,7 @@ def set_targets(rows, rw, stage, shares, factors, gh, target):
 
 @inlined
 def keep_growth(rows, rw, stage, gh, target):
-    """What a stage makes of the coordinates of stiff forces and of their rates, from its solution."""
+    """Keep the coordinates of stiff forces and their rates after a stage, from its solution."""
     for k in range(rows.forced.size):
         for row in range(rows.forced[k], rows.start[k + 1]):
             yielded = rw.compliance[LANES * k + row - rows.start[k]] * rw.lam[row]

@@ -99,7 +99,7 @@ class EntryPoint:
         return add
 
     def chosen(self, model: Model) -> CompiledFunction:
-        """What stands in the place for a scene."""
+        """The function that stands in the place for a scene."""
         return next((form for suits, form in self.forms if suits(model)), self.general)
 
     def __call__(self, tables: Tables, *arguments: Any) -> int:

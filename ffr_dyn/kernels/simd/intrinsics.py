@@ -1,4 +1,4 @@
-"""What compiled code takes from numba's inner parts, imported here alone, and whether that is as this code knows it.
+"""The parts of numba's private modules that compiled code uses, imported here alone, and whether they are as expected.
 
 `PLAIN` tells that it is not, or that plain forms are asked for (see the package).
 """

@@ -185,7 +185,7 @@ def _view(table: type) -> Any:
 
 @intrinsic
 def _address_of(typing, table):  # type: ignore[no-untyped-def]
-    """What `_view` was given."""
+    """The table that `_view` was given."""
 
     def generate(context, builder, signature, args):  # type: ignore[no-untyped-def]
         return builder.ptrtoint(args[0], context.get_value_type(types.int64))

@@ -1,4 +1,4 @@
-"""What declarations of forces check of their fields; each raises InputError that begins with `what`."""
+"""Checks of the fields of forces; each raises InputError that begins with `what`."""
 
 from __future__ import annotations
 

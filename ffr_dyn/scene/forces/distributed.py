@@ -72,7 +72,7 @@ def law_of_integrals(force: Any, now: Moment, c: Any, rate: Any) -> Any:
 
 
 def compiled_integrals(force: Any, table: LoadTable) -> LawNumbers:
-    """What the kernel of distributed loads reads."""
+    """The numbers that the kernel of distributed loads reads."""
     made: Affine | Spread = force.integrals(force.place.of(table.scene).model)
     return LawNumbers(made.numbers(), table.function(force.function))
 

@@ -1,4 +1,4 @@
-"""What a force is: the one protocol that all kinds of applied load keep.
+"""The protocol of a force, which all kinds of applied load keep.
 
 A kind is a frozen dataclass in a file of its own here, with a compiled kernel in another (`ffr_dyn.kernels.forces`). It says
 where it acts (a `Place`) and by which law; scenes, scene files, tables, equations, results and documentation ask it for what
@@ -32,7 +32,7 @@ class Moment(Protocol):
 
 
 class LoadTable(Protocol):
-    """What collects the numbers of forces while a scene is compiled; each method says where what it is given is kept."""
+    """The collector of the numbers of forces while a scene is compiled; each method says where what it is given is kept."""
 
     @property
     def scene(self) -> Scene: ...
@@ -48,7 +48,7 @@ class LoadTable(Protocol):
 
 @dataclass(frozen=True)
 class LawNumbers:
-    """What compiled code knows of a law: numbers, its function of time and its first among the user's values, or -1."""
+    """The numbers of a law in compiled code: constants, its function of time and its first among the user's values, or -1."""
 
     numbers: Sequence[float] | Array
     function: int = -1
@@ -88,7 +88,7 @@ class Force(ABC):
 
     @abstractmethod
     def compiled(self, table: LoadTable) -> LawNumbers:
-        """What the kernel reads of the law."""
+        """The numbers of the law that the kernel reads."""
 
     @property
     def stiff_coordinates(self) -> tuple[int, ...]:
@@ -96,7 +96,7 @@ class Force(ABC):
         return ()
 
     def slopes(self, now: Moment, c: Any, rate: Any) -> tuple[Any, Any]:
-        """What the kernel gives to implicit methods: how much the force falls with each of those coordinates and with its
+        """The slopes for implicit methods: how much the force falls with each of those coordinates and with its
         rate. Stability asks that they are no less than what the law does; negative ones count as zero."""
         return 0.0, 0.0
 
@@ -109,7 +109,7 @@ class Force(ABC):
         self.place.check(scene)
 
     def on_parts(self, whole: FlexibleBody, parts: Mapping[str, FlexibleBody]) -> tuple[Force, ...]:
-        """What acts on the parts, by name, in place of a force on the body that they make up."""
+        """The forces on the parts, by name, in place of a force on the body that they make up."""
         return (self,)
 
     def stays_in_plane(self, scene: Scene, normal: int) -> bool:

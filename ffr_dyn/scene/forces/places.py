@@ -115,7 +115,7 @@ class Place(ABC):
         self.ends(scene)
 
     def numbers(self, scene: Scene) -> list[float]:
-        """What compiled code knows of it, such as axes."""
+        """The numbers of the place in compiled code, such as axes."""
         return []
 
     def stays_in_plane(self, scene: Scene, normal: int) -> bool:

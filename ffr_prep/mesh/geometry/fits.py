@@ -1,4 +1,4 @@
-"""What surface the points of a face lie on, where nobody says it: faces of meshes, and free-form faces of geometries."""
+"""The kind of surface of a face that is given by points alone: faces of meshes, and free-form faces of geometries."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What people write for a region: names, ranges, patterns, and queries for faces by what they are and where.
+"""The language of regions: names, ranges, patterns, and queries for faces by kind and place.
 
     region    = term {"+" term}
     term      = name | range | pattern | query

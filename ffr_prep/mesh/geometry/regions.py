@@ -159,7 +159,7 @@ def _thousand(faces: Faces, query: Query) -> str:
 
 
 def _offers(faces: Faces, features: Sequence[Sequence[int]]) -> str:
-    """What to type for the first of several features; what they are where it does not tell."""
+    """The query to type for the first of several features; their description where no query tells them apart."""
     typed = [query_for(faces, feature) for feature in features[:_SHOWN]]
     known = [
         text if is_query(text) else f"{text} ({feature_in_words(faces, feature)})"
@@ -170,7 +170,7 @@ def _offers(faces: Faces, features: Sequence[Sequence[int]]) -> str:
 
 
 def query_for(faces: Faces, feature: Sequence[int]) -> str:
-    """What to type for the faces of a feature: a query that finds them and no other, or their names."""
+    """A query that finds the faces of a feature and no others, or else their names."""
     wanted = set(feature)
     for text in _candidates(faces, feature):
         (term,) = parsed(text, faces.unit)

@@ -1,4 +1,4 @@
-"""What the text of a STEP file says that the CAD library does not pass on: its unit of length, and names of faces.
+"""Facts in the text of a STEP file that the CAD library does not pass on: its unit of length, and names of faces.
 
 Source: ISO 10303-21 (clear text encoding), ISO 10303-42 (geometric and topological representation).
 """

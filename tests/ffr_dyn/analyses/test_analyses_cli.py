@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from click.testing import CliRunner
@@ -39,6 +41,12 @@ function = "0.3 + 2 * t"
 """
 
 
+def written(said: str) -> Path | None:
+    """The result file that a command tells of."""
+    names = [line.removeprefix("result       ") for line in said.splitlines() if line.startswith("result       ")]
+    return Path(names[-1]) if names else None
+
+
 @pytest.fixture
 def run(tmp_path):
     """Run a command on the scene with or without its driver; gives what it printed, and the result file."""
@@ -46,11 +54,16 @@ def run(tmp_path):
     def go(command: str, *options: str, driven: bool = True):
         file = tmp_path / "rod.toml"
         file.write_text(SCENE + (DRIVER if driven else ""))
-        return CliRunner().invoke(
-            cli, [command, str(file), *options], catch_exceptions=False
-        ).output, tmp_path / "rod.nc"
+        said = CliRunner().invoke(cli, [command, str(file), *options], catch_exceptions=False).output
+        return said, written(said)
 
     return go
+
+
+def test_another_analysis_does_not_replace_the_result_of_the_files_own(run, tmp_path):
+    assert run("run", driven=False)[1] == tmp_path / "rod.nc"
+    assert run("linearise", driven=False)[1] == tmp_path / "rod.linearise.nc"
+    assert load_result(tmp_path / "rod.nc").attributes["analysis"].startswith("forward")
 
 
 def test_check(run):
@@ -138,7 +151,7 @@ def run_file(tmp_path):
         text = SCENE.replace(TIMES, analysis) + (DRIVER if driven else "")
         file.write_text(text.replace("mass = 1.0", 'mass = "m"') + "[parameters]\nm = 1.0\n")
         done = CliRunner().invoke(cli, [command, str(file), *options])
-        return done.exception, done.output, tmp_path / "rod.nc"
+        return done.exception, done.output, written(done.output)
 
     return go
 

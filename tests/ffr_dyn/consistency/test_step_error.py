@@ -5,8 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from ffr_dyn.analyses.forward import forward
 from ffr_dyn.consistency.step_error import COARSE, IN_PART, Beside, ranges, step_errors, too_coarse
+from ffr_dyn.integrators import ROS3
 from ffr_dyn.results.result import Quantity, Result
+from ffr_dyn.scene.joints import Joint
+from ffr_dyn.scene.scene import Body, Scene
+from ffr_prep.body import rigid_body
 
 TIME = np.linspace(0.0, 1.0, 201)
 
@@ -84,6 +89,28 @@ def test_outputs_that_hardly_move_are_measured_by_their_kind():
     assert scales["b.position"] == pytest.approx(1e-3)
     assert scales["a.moment"] == pytest.approx(1e-6)
     assert scales["c.q"] == pytest.approx(1e-5)
+
+
+@pytest.mark.parametrize(
+    ("kind", "velocity"), [("spherical", (1.0, 2.0, 0.5)), ("cylindrical", (0, 0, 2.0)), ("revolute", (0, 0, 0.3))]
+)
+def test_a_pivot_at_the_origin_is_at_rest_and_asks_for_no_step(kind, velocity):
+    """Its places, rates and powers are rounding; the error of none of them is a part of what they do."""
+    body = rigid_body("a", mass=2.0, inertia=[0.1, 0.2, 0.25], centre_of_mass=(0, -0.3, 0), points={"o": (0, 0, 0)})
+    scene = Scene(
+        (Body("a", body, omega_bar=velocity),),
+        (Joint("j", kind, "ground.o", "a.o"),),
+        ground={"o": (0, 0, 0)},
+        gravity=(0, -9.81, 0),
+        plane="none",
+    )
+    found = forward(scene, end=2.0, output_step=0.01, outputs=["*"])
+    assert found.attributes["step"] > 5e-4
+    assert max(share for _, share in found.attributes["errors"].values()) < 0.02
+    finer = forward(scene, end=2.0, output_step=0.01, method=ROS3(5e-5), outputs=["*"], check=False)
+    for name in ("a.p", "j.force", "j.angle" if kind != "spherical" else "a.omega_bar"):
+        told, _ = found.attributes["errors"][name]
+        assert np.abs(found[name] - finer[name]).max() < 3 * told + 1e-9
 
 
 def test_violations_of_constraints_are_no_outputs_of_a_motion():

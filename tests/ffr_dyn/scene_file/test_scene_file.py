@@ -351,7 +351,7 @@ def test_every_misspelt_key_is_named_with_its_line(tmp_path, k):
         ('"5 N/mm"', '"5 !"', "stiffness ="),
         ('"2 * bar.length"', '"2 * speed + bar.mass"', "bar.mass ="),
         ('kind = "revolute"', 'kind = "revolut"', "[joints.hinge]"),
-        ('j = "bar.a"', 'j = "bar.c"', "[bodies.bar]"),
+        ('j = "bar.a"', 'j = "bar.c"', 'j = "bar.c"'),
         ('marker = "bar.b"', "", "[loads.push]"),
         ("[drivers]", '[drivers.m]\njoint = "hing"\nfunction = 1', "[drivers.m]"),
         ('inertia = ["bar.mass', 'inertia = [-1.0, "bar.mass', "inertia ="),

@@ -162,7 +162,7 @@ def test_a_declared_plane_leaves_out_what_is_across_and_refuses_what_cannot_be()
         flattened(slider_crank(gravity=(0, -9.81, 1.0), plane="z"), 0.0)
     scene = slider_crank(plane="z")
     leaning = [replace(body, rotation=(0.1, 0, 0)) if body.name == "rod" else body for body in scene.bodies]
-    with pytest.raises(InputError, match=r"no axis of body 'rod' is along it"):
+    with pytest.raises(InputError, match=r"no axis of the frame of body 'rod' is along it"):
         flattened(replace(scene, bodies=tuple(leaning)), 0.0)
     with pytest.raises(InputError, match="plane is 'w'"):
         slider_crank(plane="w")
