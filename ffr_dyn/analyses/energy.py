@@ -117,9 +117,9 @@ class EnergyWatch:
 
     def _given(self, rows: Record, powers: Array) -> Array:
         """(T,) what the scene had to give up to each row."""
-        steps = np.diff(rows.time, prepend=self.time)[:, None]
-        means = 0.5 * (powers + np.concatenate([self.powers[None], powers[:-1]]))
-        work = self.work + np.cumsum(steps * means, axis=0)
+        times, known = np.append(self.time, rows.time), np.concatenate([self.powers[None], powers])
+        steps, means = (times[1:] - times[:-1])[:, None], 0.5 * (known[1:] + known[:-1])
+        work = self.work + (steps * means).cumsum(axis=0)
         height = np.maximum.accumulate(np.append(self.highest, rows.energy[:, 2]))[1:]
         self.time, self.powers, self.work, self.highest = float(rows.time[-1]), powers[-1], work[-1], float(height[-1])
         found: Array = self.begun + np.maximum(work, 0.0).sum(axis=1) + height - rows.energy[:, 2]

@@ -520,7 +520,7 @@ def _account(run: _Run, notes: list[str]) -> dict[str, Any]:
                         assembled.system, assembled.all_rows, run.engine.work, run.energy.spacing
                     ),
                     BALANCE: run.energy.amiss(),
-                    **between_rows(run.seen, run.engine.system, run.engine.work, new_record(run.engine.system, 0)),
+                    **between_rows(run.seen, run.engine.system, run.engine.work),
                 },
             ),
         ],

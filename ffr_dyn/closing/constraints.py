@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -18,7 +19,7 @@ from ffr_dyn.compile.scene_tables import System, compile_scene
 from ffr_dyn.equations.constraint_rows import Block, drive_at
 from ffr_dyn.equations.layout import Layout
 from ffr_dyn.kernels.entry_points import evaluate_markers, evaluate_rows
-from ffr_dyn.kernels.tables import ALL, Model
+from ffr_dyn.kernels.tables import ALL, Model, RowWork
 from ffr_dyn.scene.scene import Scene
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.brief import Brief
@@ -84,7 +85,7 @@ def constraints_of(scene: Scene, blocks: list[Block], time: float) -> Constraint
     for function, (block, word) in zip(rows.function.tolist(), said, strict=True):
         if function >= 0:
             drives[function] = drive_at(block, word, time)
-    return Constraints(scene, place, tuple(blocks), _numbers(system), drives, engine, _entries(system.model, place))
+    return Constraints(scene, place, tuple(blocks), _numbers(system), drives, engine, entries_of(system.model, place))
 
 
 def _numbers(system: System) -> Array:
@@ -110,11 +111,21 @@ def of_blocks(constraints: Constraints, chosen: list[int]) -> Constraints:
 
 def rows_at(constraints: Constraints, x: Array, v: Array) -> RowsAt:
     """The rows at (x, v), v in global axes."""
-    work, numbers = constraints.engine.work, constraints.numbers
+    rows, numbers = _evaluated(constraints, x, v), constraints.numbers
+    return RowsAt(rows.Phi[numbers], rows.nu[numbers], rows.gamma[numbers], _jacobian(constraints))
+
+
+def open_at(constraints: Constraints, x: Array, v: Array) -> tuple[Array, Array]:
+    """Phi and nu (C,) of the rows at (x, v)."""
+    rows = _evaluated(constraints, x, v)
+    return rows.Phi[constraints.numbers], rows.nu[constraints.numbers]
+
+
+def _evaluated(constraints: Constraints, x: Array, v: Array) -> RowWork:
+    work = constraints.engine.work
     work.functions[:] = constraints.drives
     evaluate_rows(constraints.engine.tables, np.ascontiguousarray(x), np.ascontiguousarray(v))
-    rows = work.rows
-    return RowsAt(rows.Phi[numbers], rows.nu[numbers], rows.gamma[numbers], _jacobian(constraints))
+    return work.rows
 
 
 def _jacobian(constraints: Constraints) -> Matrix:
@@ -132,25 +143,44 @@ def _jacobian(constraints: Constraints) -> Matrix:
     return csr_array((entries, np.divmod(found.at, size[1])), shape=size)[numbers]
 
 
-def _entries(model: Model, place: Layout) -> Entries:
-    rows, body = model.rows, model.markers.body
+def entries_of(model: Model, place: Layout) -> Entries:
+    """Entries of the rows of a scene; those of the last structures are known by the integers that make them."""
+    m = model.markers
+    return _entries(
+        model.rows.marker.shape[1], *map(_listed, (model.rows.marker, model.rows.start, m.body, m.start)), place
+    )
+
+
+def _listed(table: Array) -> tuple[int, ...]:
+    return tuple(table.ravel().tolist())
+
+
+@lru_cache(64)
+def _entries(
+    sides: int,
+    markers: tuple[int, ...],
+    start: tuple[int, ...],
+    body: tuple[int, ...],
+    phi: tuple[int, ...],
+    place: Layout,
+) -> Entries:
+    """Entries by markers on all sides of the blocks, first rows of the blocks, and body and place in `phi` of all markers."""
     row, side, lane, first = list[int](), list[int](), list[int](), list[int]()
     flexible = list[tuple[slice, int, int]]()
-    for block, ends in enumerate(rows.marker.tolist()):
-        begin, end = rows.start[block : block + 2].tolist()
-        for number, marker in enumerate(ends):
-            b = body[marker] if marker >= 0 else len(place.n)
-            if b == len(place.n):
-                continue
-            if place.n[b]:
-                flexible.append((slice(len(row), len(row) + end - begin), int(model.markers.start[marker]), int(b)))
-            row += range(begin, end)
-            lane += range(end - begin)
-            side += [block * len(ends) + number] * (end - begin)
-            first += [place.iv[b]] * (end - begin)
-    start = np.array(row, dtype=np.int64) * place.v_size + np.array(first, dtype=np.int64)
-    at = [(start[:, None] + np.arange(6)).ravel()]
-    at += [(start[of, None] + 6 + np.arange(place.n[b])).ravel() for of, _, b in flexible]
+    for number, marker in enumerate(markers):
+        begin, end = start[number // sides : number // sides + 2]
+        b = body[marker] if marker >= 0 else len(place.n)
+        if b == len(place.n):
+            continue
+        if place.n[b]:
+            flexible.append((slice(len(row), len(row) + end - begin), phi[marker], b))
+        row += range(begin, end)
+        lane += range(end - begin)
+        side += [number] * (end - begin)
+        first += [place.iv[b]] * (end - begin)
+    origin = np.array(row, dtype=np.int64) * place.v_size + np.array(first, dtype=np.int64)
+    at = [(origin[:, None] + np.arange(6)).ravel()]
+    at += [(origin[of, None] + 6 + np.arange(place.n[b])).ravel() for of, _, b in flexible]
     shapes = tuple((of, begin, place.n[b]) for of, begin, b in flexible)
     numbers = np.array([row, side, lane], dtype=np.int64)
     return Entries(numbers[0], numbers[1], numbers[2], shapes, np.concatenate(at))

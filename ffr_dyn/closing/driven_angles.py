@@ -9,13 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from ffr_dyn.closing.constraints import Constraints
 from ffr_dyn.closing.going_on import going_on
 from ffr_dyn.closing.positions import LARGEST_TURN, close_velocities, largest_turn
-from ffr_dyn.equations.constraints import Markers
+from ffr_dyn.equations.kinematics import marker_direction
 from ffr_dyn.equations.layout import moved, to_body_axes
 from ffr_dyn.scene.joints import DRIVEN_ANGLE
 from ffr_prep.common.arrays import Array
@@ -37,14 +38,14 @@ class DrivenAngle:
 
 def driven_angles(constraints: Constraints, x: Array) -> list[DrivenAngle]:
     """All driven angles at x; what is left is within half a turn, and nothing where the joint has no angle."""
-    now = Markers(constraints.scene, constraints.place, x, np.zeros(constraints.place.v_size))
+    seen = partial(marker_direction, constraints.scene, constraints.place, x)
     functions, found = iter(constraints.functions.tolist()), []
     for block in constraints.blocks:
         for word in block.words:
             function = next(functions)
             if word.kind == DRIVEN_ANGLE:
-                f, g = (now.axis(block.markers[0], word.axes[k]).r for k in (0, 1))
-                f_j, value = now.axis(block.markers[1], word.axes[2]).r, float(constraints.drives[function, 0])
+                f, g = (seen(block.markers[0], word.axes[k]) for k in (0, 1))
+                f_j, value = seen(block.markers[1], word.axes[2]), float(constraints.drives[function, 0])
                 left = value - float(np.arctan2(g @ f_j, f @ f_j))
                 found.append(DrivenAngle(function, value, left - TURN * round(left / TURN)))
     return found

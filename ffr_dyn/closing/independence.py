@@ -65,6 +65,8 @@ def redundant_drivers(constraints: Constraints, x: Array, v: Array) -> tuple[str
 
 
 def _drivers_in(N: Array, blocks: list[Block]) -> tuple[str, ...]:
+    if not N.size:
+        return ()
     owners = [block for block in blocks for _ in block.words]
     parts = np.abs(N).max(axis=1, initial=0.0)
     found = (block.name for block, part in zip(owners, parts, strict=True) if block.driver and part > TAKES_PART)

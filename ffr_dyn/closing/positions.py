@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.sparse import block_diag, coo_array, csr_array
 
-from ffr_dyn.closing.constraints import Constraints, RowsAt, rows_at
+from ffr_dyn.closing.constraints import Constraints, RowsAt, open_at, rows_at
 from ffr_dyn.closing.row_space import Matrix, smallest_solution
 from ffr_dyn.equations.inertia import kept_integrals, mass_matrix
 from ffr_dyn.equations.layout import Layout, moved, to_global_axes
@@ -29,13 +29,13 @@ def close_positions(constraints: Constraints, x: Array, v: Array) -> Array:
     Raises InputError for rows that stay open.
     """
     place = constraints.place
+    if np.abs(open_at(constraints, x, v)[0]).max(initial=0.0) < TOLERANCE:
+        return x
     for elastic in (False, True):
         found = x
-        for iteration in range(ITERATIONS):
+        for _ in range(ITERATIONS):
             rows = rows_at(constraints, found, v)
             closed = np.abs(rows.Phi).max(initial=0.0) < TOLERANCE
-            if closed and iteration == 0:
-                return found
             found = moved(place, found, _limited(place, _step(constraints, found, rows, -rows.Phi, elastic)))
             if closed:  # and now to rounding, which tells rows that depend on others from those that nearly do
                 return found
@@ -66,7 +66,7 @@ def close_velocities(constraints: Constraints, x: Array, v: Array) -> Array:
     for elastic in (False, True):
         step = _step(constraints, x, rows, -rows.nu, elastic)
         faster = v + to_global_axes(place, x, step)
-        left = np.abs(rows_at(constraints, x, faster).nu)
+        left = np.abs(open_at(constraints, x, faster)[1])
         if left.size == 0 or left.max() < 1e-9 * max(1.0, float(np.abs(rows.nu).max())):
             return faster
     names = [block.name for block in constraints.blocks for _ in block.words]
@@ -98,18 +98,17 @@ def weights(scene: Scene, place: Layout, x: Array, elastic: bool, dense: bool) -
 def _root(body: Body, q: Array, rigid: tuple[int, ...], elastic: bool) -> Array:
     """(6 + n, 6 + n) of one body, which bodies of one model and state share."""
     n = body.model.n
-    active = (*rigid, *range(6, 6 + n if elastic else 6))
+    active = [*rigid, *range(6, 6 + n if elastic else 6)]
 
     def make() -> Array:
-        at = np.ix_(active, active)
-        values, vectors = np.linalg.eigh(mass_matrix(kept_integrals(body), q)[at])
+        values, vectors = np.linalg.eigh(mass_matrix(kept_integrals(body), q)[active][:, active])
         root = np.zeros((6 + n, 6 + n))
-        root[at] = vectors / np.sqrt(np.maximum(values, 1e-12 * values.max()))
+        root[np.ix_(active, active)] = vectors / np.sqrt(np.maximum(values, 1e-12 * values.max()))
         return root
 
     if q.any():
         return make()
-    return remembered(body.model, ("root of mass", body.dropped, body.stiffening, active), make)
+    return remembered(body.model, ("root of mass", body.dropped, body.stiffening, tuple(active)), make)
 
 
 def _step(constraints: Constraints, x: Array, rows: RowsAt, target: Array, elastic: bool) -> Array:

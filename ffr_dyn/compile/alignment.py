@@ -8,13 +8,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any, Generic, TypeVar, cast
+from itertools import accumulate
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 
+from ffr_dyn.kernels.simd.table_address import address_of, pack, places_of_addresses
 from ffr_prep.common.arrays import Array
 
 T = TypeVar("T", bound=tuple[Any, ...])
+Form = tuple[tuple[int, ...], Any, int]
 
 LINE = 8  # numbers of eight bytes in a cache line
 
@@ -23,47 +26,66 @@ LINE = 8  # numbers of eight bytes in a cache line
 class Piece(Generic[T]):
     """Nested named tuples with all their arrays in one piece, to be copied as often as wanted.
 
-    numbers : the piece, eight bytes each;  forms : shape, type and beginning [bytes] of every array
-    order   : which array each field holds, one field after the other; an array that is there twice stays one
+    words : as `pack` writes them;  numbers : the piece, eight bytes each
+    forms : shape, type and beginning [bytes] of every array
+    order : which array each field holds, one field after the other; an array that is there twice stays one
+    places : of the addresses among the words
     """
 
     tables: T
+    words: Array
     numbers: Array
-    forms: list[tuple[tuple[int, ...], Any, int]]
+    forms: list[Form]
     order: list[int]
+    places: Array
 
 
-def in_one_piece(tables: T) -> Piece[T]:
-    """With the arrays of the tables as they are now."""
-    arrays: dict[int, Array] = {}
-    fields = list[int]()
+def aligned(tables: T) -> T:
+    """Nested named tuples with copies of their arrays in one piece."""
+    return _laid_out(tables)[0]
+
+
+def in_one_piece(tables: T, but: str = "") -> Piece[T]:
+    """Tables with their arrays as they are now, of a kind that `pack` knows.
+
+    but : a field that is an empty tuple, of which the words are left open
+    """
+    made, numbers, forms, order = _laid_out(tables)
+    address = address_of(numbers)
+    words = pack(made, [address + forms[k][2] for k in order], but)
+    return Piece(made, words, numbers, forms, order, places_of_addresses(type(made), but))
+
+
+def copied(piece: Piece[T]) -> tuple[T, Array]:
+    """The tables in memory of their own, and their words."""
+    numbers, words = _room(piece.numbers.size), piece.words.copy()
+    numbers[:] = piece.numbers
+    words[piece.places] += address_of(numbers) - address_of(piece.numbers)
+    return _replaced(piece.tables, _views(numbers, piece.forms), iter(piece.order)), words
+
+
+def _laid_out(tables: T) -> tuple[T, Array, list[Form], list[int]]:
+    """`Piece.tables` and what follows its words."""
+    arrays, fields = dict[int, Array](), list[int]()
     _gather(tables, arrays, fields)
-    sizes = [-(-array.size // LINE) * LINE for array in arrays.values()]
-    begin = np.concatenate([[0], np.cumsum(sizes, dtype=np.int64)]).tolist()
-    numbers = np.zeros(begin[-1], dtype=np.int64)
+    begin = list(accumulate((-(-array.size // LINE) * LINE for array in arrays.values()), initial=0))
     forms = [(array.shape, array.dtype, 8 * at) for array, at in zip(arrays.values(), begin, strict=False)]
-    for array, (shape, dtype, at) in zip(arrays.values(), forms, strict=True):
-        np.ndarray(shape, dtype, numbers, at)[...] = array
-    place = {key: number for number, key in enumerate(arrays)}
-    return Piece(tables, numbers, forms, [place[key] for key in fields])
+    numbers, place = _room(begin[-1]), {key: number for number, key in enumerate(arrays)}
+    views, order = _views(numbers, forms), [place[key] for key in fields]
+    for view, array in zip(views, arrays.values(), strict=True):
+        view[...] = array
+    return _replaced(tables, views, iter(order)), numbers, forms, order
 
 
-def copied(piece: Piece[T]) -> tuple[T, dict[int, int]]:
-    """The tables in memory of their own, and the addresses of their arrays, by identity."""
-    size = piece.numbers.size
-    memory = np.empty(size + LINE, dtype=np.int64)
-    first = memory.ctypes.data
-    at = -first // 8 % LINE
-    memory[at : at + size] = piece.numbers
-    copies = [np.ndarray(shape, dtype, memory, 8 * at + begin) for shape, dtype, begin in piece.forms]
-    begun = first + 8 * at
-    addresses = {id(copy): begun + begin for copy, (_, _, begin) in zip(copies, piece.forms, strict=True)}
-    return cast("T", _replaced(piece.tables, copies, iter(piece.order))), addresses
+def _room(size: int) -> Array:
+    """(size,) numbers from the start of a cache line."""
+    memory = np.zeros(size + LINE, dtype=np.int64)
+    at = -address_of(memory) // 8 % LINE
+    return memory[at : at + size]
 
 
-def aligned(tables: T) -> tuple[T, dict[int, int]]:
-    """Nested named tuples with copies of their arrays in one piece of memory, and the addresses of these, by identity."""
-    return copied(in_one_piece(tables))
+def _views(numbers: Array, forms: list[Form]) -> list[Array]:
+    return [np.ndarray(shape, dtype, numbers, begin) for shape, dtype, begin in forms]
 
 
 def _gather(tables: Any, found: dict[int, Array], fields: list[int]) -> None:
@@ -75,11 +97,11 @@ def _gather(tables: Any, found: dict[int, Array], fields: list[int]) -> None:
             _gather(field, found, fields)
 
 
-def _replaced(tables: Any, copies: list[Array], order: Iterator[int]) -> Any:
+def _replaced(tables: Any, arrays: list[Array], order: Iterator[int]) -> Any:
     fields = [
-        copies[next(order)]
+        arrays[next(order)]
         if isinstance(field, np.ndarray)
-        else _replaced(field, copies, order)
+        else _replaced(field, arrays, order)
         if isinstance(field, tuple)
         else field
         for field in tables

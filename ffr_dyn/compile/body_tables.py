@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass
+from itertools import accumulate
 
 import numpy as np
 
@@ -29,12 +30,14 @@ from ffr_dyn.variants.families import ROUNDING, SECOND_ORDER_ROUNDING
 from ffr_prep.body import axial, remembered
 from ffr_prep.common.arrays import Array
 
-SYMMETRIC = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+SYMMETRIC = [0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]
 
 
 def _six(tensor: Array) -> Array:
     """(3, 3, ...) -> (6, ...) symmetric part."""
-    return np.stack([0.5 * (tensor[k, l] + tensor[l, k]) for k, l in SYMMETRIC])  # noqa: E741
+    rows, columns = SYMMETRIC
+    found: Array = 0.5 * (tensor[rows, columns] + tensor[columns, rows])
+    return found
 
 
 def _nine(tensor: Array) -> Array:
@@ -49,12 +52,12 @@ def _PP_parts(integrals: Integrals, normal: int) -> Array:
 
 
 def _pool(parts: list[Array]) -> Array:
-    return np.concatenate([np.ravel(p) for p in parts]) if parts else np.zeros(0)
+    return np.concatenate([part.ravel() for part in parts]) if parts else np.zeros(0)
 
 
 def starts(sizes: Sequence[int] | Array) -> Array:
     """Where parts of these sizes begin one after another, and the end."""
-    return np.concatenate([[0], np.cumsum(sizes, dtype=np.int64)]).astype(np.int64)
+    return np.array(list(accumulate(sizes, initial=0)), dtype=np.int64)
 
 
 def once(parts: Sequence[Array], owners: Sequence[Hashable]) -> tuple[Array, Array]:
@@ -138,7 +141,7 @@ def body_tables(scene: Scene, place: Layout) -> Bodies:
     """Tables of all bodies."""
     of = [_tables(body, normal) for body, normal in zip(scene.bodies, place.normals, strict=True)]
     owners = [_owner(body) for body in scene.bodies]
-    in_plane = [(*owner, k) for owner, k in zip(owners, place.normals, strict=True)]
+    in_plane = [(*owner, k) * (n > 0) for owner, k, n in zip(owners, place.normals, place.n, strict=True)]
     PP = tables_in_blocks(in_plane, lambda b: of[b].PP_dm)
     omega2, column = once([i.omega2 for i in of], owners)
     bounds, beside = zip(*(_damping(body) for body in scene.bodies), strict=True)
@@ -172,6 +175,8 @@ def _damping(body: Body) -> tuple[Array, Array]:
     much; empty where the matrix is diagonal."""
     if not body.model.n:
         return body.damping, body.damping
+    if body.model.damping is None:
+        return 2 * body.damping * np.sqrt(body.model.omega2), np.zeros(0)
     D = damping_matrix(body.model, body.damping)
     diagonal = np.diag(D)
     rest = D - np.diag(diagonal)

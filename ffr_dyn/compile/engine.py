@@ -2,23 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
-from ffr_dyn.compile.alignment import aligned
 from ffr_dyn.compile.first_use import ensure_compiled
 from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.compile.stiff_rows import with_stiff_rows
-from ffr_dyn.compile.workspace import new_stages, new_work
+from ffr_dyn.compile.workspace import new_tables
 from ffr_dyn.kernels.entry_points import evaluate_exact, evaluate_loads, record_state, run, run_controlled, step
-from ffr_dyn.kernels.simd.entry_point import ENTRY_POINTS
 from ffr_dyn.kernels.simd.force_kernel import kernel_of
-from ffr_dyn.kernels.simd.table_address import pack
-from ffr_dyn.kernels.tables import NOT_FINITE, OK, PER_ROW, Clock, Control, Model, Record, Tables, Work
-from ffr_dyn.scene.force_kinds import kernels_of
+from ffr_dyn.kernels.simd.table_address import address_of, pack, place_of
+from ffr_dyn.kernels.tables import NOT_FINITE, OK, PER_ROW, SPACING, Control, Model, Record, Tables, Work
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.brief import Brief
 
@@ -75,54 +72,45 @@ def new_engine(
     if method is not None and method.takes_forces:
         system = with_stiff_rows(system)
     kinds = () if method is None else (type(method),)
-    chosen = [entry.chosen(system.model) if entry.needed(system.model) else None for entry in ENTRY_POINTS.values()]
-    kernels = kernels_of(system.scene)
-    ensure_compiled(*kinds, chosen=chosen, forces=kernels)
-    if method is None:
-        stages, h = new_stages(system, 0), 0.0
-    else:
-        kept, h = 2 if method.repeatable else 0, method.step
-        stages = new_stages(system, method.stage_count, method.row_stages, method.numbers, kept)
-    clock = Clock(np.array([h, h or spacing]), np.zeros(3, dtype=np.int64), np.array(gains))
-    control = _control(system, method, start, spacing)
-    keeps_terms = method is not None and method.keeps_terms
-    work, of_work = new_work(system.model, keeps_terms=keeps_terms, keeps_passed=keeps_passed)
-    places = np.array([0 if each is None else each.address for each in chosen], dtype=np.int64)
+    ensure_compiled(*kinds, chosen=system.chosen, forces=system.kernels)
+    tables, words = new_tables(system, method, keeps_passed)
+    tables.entry_points[:] = [0 if each is None else each.address for each in system.chosen]
+    tables.forces[:] = [kernel_of(kernel).address for kernel in system.kernels]
+    tables.clock.time[SPACING] = spacing
     if method is not None:
-        places[step.number] = method.do_step.address
-    forces = np.array([kernel_of(kernel).address for kernel in kernels], dtype=np.int64)
-    own = np.array(x, dtype=float), np.array(v, dtype=float)
-    memory, addresses = aligned((places, forces, stages, clock, control, *own))
-    places, forces, stages, clock, control, x, v = memory
-    tables = Tables(0, places, forces, system.model, work, stages, clock, control, x, v)
-    return _packed(system, tables, {**system.addresses, **of_work, **addresses})
+        tables.entry_points[step.number] = method.do_step.address
+        tables.stages.numbers[:] = method.numbers
+        tables.clock.time[:] = method.step, method.step or spacing
+        if method.controlled:
+            _set_control(tables.control, system, cast("Controlled", method), start, spacing)
+    tables.clock.gains[:] = gains
+    tables.x[:], tables.v[:] = x, v
+    return _engine(system, tables, words)
 
 
-def _control(system: System, method: Integrator | None, start: float, spacing: float) -> Control:
-    if method is None or not method.controlled:
-        return Control(np.zeros(0), np.zeros(2, dtype=np.int64), *(np.zeros(0) for _ in range(6)))
-    place, controlled = system.layout, cast("Controlled", method)
-    wanted = controlled.tolerances
-    x, v = np.full(place.x_size, wanted.position), np.full(place.v_size, wanted.velocity)
+def _set_control(control: Control, system: System, method: Controlled, start: float, spacing: float) -> None:
+    place, wanted = system.layout, method.tolerances
+    control.weight_x[:], control.weight_v[:] = wanted.position, wanted.velocity
     for b, body in enumerate(system.scene.bodies):
         # Elastic coordinates are displacements times the square root of a mass; their rates count over one step.
-        elastic, n = wanted.elastic * np.sqrt(body.model.mass), body.model.n
-        x[place.ix[b] + 7 : place.ix[b] + 7 + n] = elastic
-        v[place.iv[b] + 6 : place.iv[b] + 6 + n] = -elastic
-    numbers = [0.01 * spacing, start, start, 1.0, wanted.relative, controlled.estimate_order, LEAST_STEP * spacing]
-    sizes = (place.x_size, place.v_size) * 2
-    return Control(np.array(numbers), np.zeros(2, dtype=np.int64), x, v, *(np.zeros(size) for size in sizes))
+        elastic = wanted.elastic * np.sqrt(body.model.mass)
+        control.weight_x[place.q(b)], control.weight_v[place.q_dot(b)] = elastic, -elastic
+    least = LEAST_STEP * spacing
+    control.numbers[:] = 0.01 * spacing, start, start, 1.0, wanted.relative, method.estimate_order, least
 
 
-def _packed(system: System, tables: Tables, addresses: Mapping[int, int]) -> Engine:
-    words = pack(tables, addresses)
-    words[0] = words.ctypes.data
-    return Engine(system, tables._replace(address=words.ctypes.data), words)
+def _engine(system: System, tables: Tables, words: Array) -> Engine:
+    """Engine with the words of the system's model in those of the tables."""
+    at = place_of(Tables, "model")
+    words[at : at + system.words.size] = system.words
+    words[0] = address_of(words)
+    return Engine(system, tables._replace(address=int(words[0])), words)
 
 
 def with_model(engine: Engine, model: Model) -> Engine:
     """The same memory for other constant tables of the same shapes."""
-    return _packed(replace(engine.system, model=model, addresses={}), engine.tables._replace(model=model), {})
+    system = replace(engine.system, model=model, words=pack(model))
+    return _engine(system, engine.tables._replace(model=model), engine.words.copy())
 
 
 def evaluate_at(engine: Engine, t: float, x: Array, v: Array) -> int:
@@ -155,7 +143,7 @@ def row_filler(engine: Engine, record: Record) -> Callable[[float], int]:
     """`fill_rows` for one record, again and again at the least cost: of the time of step number 0, a status."""
     entry = run_controlled if engine.tables.control.numbers.size else run
     call, words = entry.general.c_function, pack(record)
-    address, place = engine.address, words.ctypes.data
+    address, place = engine.address, address_of(words)
 
     def fill(start: float, kept: Array = words) -> int:  # the numbers at `place` live as long as this function
         return call(address, start, place)

@@ -38,7 +38,7 @@ def marker_tables(scene: Scene, place: Layout, blocks: tuple[Block, ...]) -> Mar
         return _bending(scene.bodies[b], point, rows[k]) if bends[k] else NO_BLOCKS
 
     body = [scene.bodies[b].model if b < ground else None for b, _, _ in table]
-    bending = tables_in_blocks([(id(body[k]), table[k][2], rows[k], bends[k]) for k in range(len(table))], make)
+    bending = tables_in_blocks([(id(body[k]), table[k][2], rows[k]) * bends[k] for k in range(len(table))], make)
     counts = [len(row) for row in rows]
     turns = [int(k in turning) for k in range(len(table))]
     return Markers(
@@ -46,7 +46,7 @@ def marker_tables(scene: Scene, place: Layout, blocks: tuple[Block, ...]) -> Mar
         u=np.array([i.position for i in interfaces] + list(scene.ground.values())).reshape(-1, 3),
         phi=phi,
         start=start,
-        second=np.column_stack([turns, counts, bending.start, bending.first]).astype(np.int64).reshape(-1, 4),
+        second=np.array([turns, counts, bending.start, bending.first], dtype=np.int64).T.copy(),
         bending=bending.pool,
         blocks=bending.plans,
         active=np.array(sorted({*joint, *loaded}), dtype=np.int64),

@@ -64,9 +64,9 @@ def _relation(word: Word) -> tuple[float, ...]:
 
 def first_of_each(numbers: Array) -> Array:
     """Of numbers in any order, 1 where one is there for the first time."""
-    first = np.zeros(numbers.size, dtype=np.int64)
-    first[np.unique(numbers, return_index=True)[1]] = 1
-    return first.reshape(numbers.shape)
+    listed = numbers.ravel().tolist()
+    place = {number: k for k, number in reversed(list(enumerate(listed)))}
+    return np.array([place[number] == k for k, number in enumerate(listed)], dtype=np.int64).reshape(numbers.shape)
 
 
 def pattern_of(

@@ -5,10 +5,11 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from ffr_dyn.compile.alignment import aligned
+from ffr_dyn.compile.alignment import in_one_piece
 from ffr_dyn.compile.body_tables import body_tables
 from ffr_dyn.compile.elimination import Elimination, eliminate
 from ffr_dyn.compile.force_tables import Callback, FunctionTable, base_functions, load_tables
@@ -17,7 +18,9 @@ from ffr_dyn.compile.row_tables import alike, moving_bodies, pattern_of, row_tab
 from ffr_dyn.equations.constraint_rows import Block, blocks_of
 from ffr_dyn.equations.layout import Layout, layout
 from ffr_dyn.equations.state_view import StateView
+from ffr_dyn.kernels.simd.entry_point import ENTRY_POINTS, CompiledFunction
 from ffr_dyn.kernels.tables import Model
+from ffr_dyn.scene.force_kinds import kernels_of
 from ffr_dyn.scene.scene import Scene, markers
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.brief import Brief
@@ -30,7 +33,7 @@ class System(Brief):
 
     blocks : in elimination order, as the rows in the tables;  user : keeps the callback of the user's functions alive
     inputs : where the numbers of a signal begin among those of the time functions, by its name
-    addresses : of the arrays of the tables, by identity
+    words : the tables as `pack` writes them
     """
 
     scene: Scene
@@ -40,7 +43,18 @@ class System(Brief):
     model: Model
     user: UserFunctions
     inputs: Mapping[str, tuple[int, ...]]
-    addresses: Mapping[int, int]
+    words: Array
+
+    @cached_property
+    def kernels(self) -> tuple[CompiledFunction | str, ...]:
+        """Kernels of the forces, by number."""
+        return tuple(kernels_of(self.scene))
+
+    @cached_property
+    def chosen(self) -> tuple[CompiledFunction | None, ...]:
+        """Compiled forms of all entry points, by number; None for those that the scene does not call."""
+        m = self.model
+        return tuple(entry.chosen(m) if entry.needed(m) else None for entry in ENTRY_POINTS.values())
 
 
 def compile_scene(scene: Scene, blocks: list[Block] | None = None, relaxation: float = 0.0) -> System:
@@ -73,8 +87,8 @@ def compile_scene(scene: Scene, blocks: list[Block] | None = None, relaxation: f
     }
     user = UserFunctions(functions.callbacks, place, scene)
     compiled = Model(**model, user_address=user.address, user_count=user.count, stiff_count=0)  # type: ignore[arg-type]
-    tables, addresses = aligned(compiled)
-    return System(scene, place, ordered, elimination, tables, user, functions.inputs(), addresses)
+    piece = in_one_piece(compiled)
+    return System(scene, place, ordered, elimination, piece.tables, user, functions.inputs(), piece.words)
 
 
 # ---- the user's Python functions ----------------------------------------------------------------------------------

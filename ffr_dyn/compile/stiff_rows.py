@@ -16,6 +16,7 @@ from ffr_dyn.compile.elimination import eliminate
 from ffr_dyn.compile.row_tables import alike, first_of_each, moving_bodies, pattern_of
 from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.equations.constraint_rows import Block
+from ffr_dyn.kernels.simd.table_address import pack
 from ffr_dyn.kernels.tables import BLOCK, FORCED, LANE, LANES, Rows
 from ffr_dyn.scene.force_kinds import forces_of
 from ffr_dyn.scene.joints import Word
@@ -46,7 +47,7 @@ def with_stiff_rows(system: System) -> System:
     pattern = pattern_of(
         ordered, [moving[k] for k in order], elimination, m.markers, alike(system.scene, system.layout)
     )
-    (rows, pattern, joint, row), addresses = aligned((rows, pattern, joint, row))
+    rows, pattern, joint, row = aligned((rows, pattern, joint, row))
     changed = m._replace(
         rows=rows,
         pattern=pattern,
@@ -54,8 +55,7 @@ def with_stiff_rows(system: System) -> System:
         loads=m.loads._replace(row=row),
         stiff_count=int((rows.start[1:] - rows.forced).sum()),
     )
-    addresses = {**system.addresses, **addresses}
-    return replace(system, blocks=ordered, elimination=elimination, model=changed, addresses=addresses)
+    return replace(system, blocks=ordered, elimination=elimination, model=changed, words=pack(changed))
 
 
 def _extended(system: System) -> tuple[list[Block], list[Place]]:

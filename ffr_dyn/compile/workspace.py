@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Sequence
+from collections.abc import Hashable
 from functools import lru_cache
-from typing import Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -18,6 +18,8 @@ from ffr_dyn.kernels.tables import (
     MOST_PASSED,
     NORMAL,
     BodyWork,
+    Clock,
+    Control,
     LoadWork,
     MarkerWork,
     Model,
@@ -25,35 +27,82 @@ from ffr_dyn.kernels.tables import (
     Record,
     RowWork,
     Stages,
+    Tables,
     Work,
 )
 from ffr_dyn.kernels.vectors import LEAST_PIVOT
 from ffr_prep.common.arrays import Array
 
+if TYPE_CHECKING:
+    from ffr_dyn.integrators import Integrator
+
 MOST, LARGE = 32, 100_000  # pieces of memory that are known, and numbers of one that is not
 
-_BLANK: dict[Hashable, Piece[Work]] = {}
+_BLANK: dict[Hashable, Piece[Tables]] = {}
 
 
-def new_work(m: Model, *, keeps_terms: bool = False, keeps_passed: bool = False) -> tuple[Work, dict[int, int]]:
-    """Scratch of evaluations, and where its arrays are; what depends on the elastic diagonal is made when that is set.
+class _Needs(NamedTuple):
+    """What memory depends on beside the scene: states, rows, numbers and steps that a method keeps, and which kind it is."""
 
-    keeps_terms  : whether the quadratic terms of all bodies are needed after an evaluation
-    keeps_passed : whether positions beside singular ones are
+    states: int = 0
+    rows: int = 0
+    numbers: int = 0
+    kept: int = 0
+    controlled: bool = False
+    keeps_terms: bool = False
+    keeps_passed: bool = False
 
-    Scenes of one structure have the same scratch but for the numbers that `_fill` puts there.
+
+def new_tables(system: System, method: Integrator | None, keeps_passed: bool) -> tuple[Tables, Array]:
+    """Memory for a scene and a method (none: evaluations alone), and its words (`pack`), those of the model left open.
+
+    keeps_passed : whether positions beside singular ones are kept
+
+    Scenes of one structure have the same but for the numbers that `_fill` and an engine put there. What depends on the
+    elastic diagonal is made when that is set.
     """
-    key = _structure(m), keeps_terms, keeps_passed
+    needs = _Needs(keeps_passed=keeps_passed)
+    if method is not None:
+        kept = 2 if method.repeatable else 0
+        sizes = method.stage_count, method.row_stages, len(method.numbers), kept
+        needs = _Needs(*sizes, method.controlled, method.keeps_terms, keeps_passed)
+    key = _structure(system.model), needs, len(system.kernels)
     blank = _BLANK.get(key)
     if blank is None:
-        blank = in_one_piece(_blank_work(m, keeps_terms, keeps_passed))
+        blank = in_one_piece(_blank(system, needs), but="model")
         if len(_BLANK) >= MOST:
             _BLANK.clear()
         if blank.numbers.size < LARGE:
             _BLANK[key] = blank
-    work, addresses = copied(blank)
-    _fill(work, m)
-    return work, addresses
+    tables, words = copied(blank)
+    _fill(tables.work, system.model)
+    return tables._replace(model=system.model), words
+
+
+def _blank(system: System, needs: _Needs) -> Tables:
+    X, V = system.layout.x_size, system.layout.v_size
+    chosen = {"numbers": 7, "weight_x": X, "weight_v": V, "x": X, "v": V, "held_x": X, "held_v": V}
+    return Tables(
+        address=0,
+        entry_points=np.zeros(len(system.chosen), dtype=np.int64),
+        forces=np.zeros(len(system.kernels), dtype=np.int64),
+        model=(),  # type: ignore[arg-type]  # each scene has its own
+        work=_blank_work(system.model, needs.keeps_terms, needs.keeps_passed),
+        stages=_stages(system, needs),
+        clock=Clock(np.zeros(2), np.zeros(3, dtype=np.int64), np.zeros(3)),
+        control=Control(
+            counts=np.zeros(2, dtype=np.int64),
+            **_zeros(**{key: size * needs.controlled for key, size in chosen.items()}),
+        ),
+        **_zeros(x=X, v=V),
+    )
+
+
+def _stages(system: System, needs: _Needs) -> Stages:
+    X, V, C = system.layout.x_size, system.layout.v_size, system.model.rows.kind.size
+    states, kept = needs.states, needs.kept
+    rows = _zeros(rows=(needs.rows, C), target=C, numbers=needs.numbers)
+    return Stages(**_zeros(x=(states, X), v=(states, V), kept_x=(kept, X), kept_v=(kept, V)), **rows)
 
 
 def _structure(m: Model) -> Hashable:
@@ -80,7 +129,8 @@ def _fill(work: Work, m: Model) -> None:
     for b in np.flatnonzero(m.bodies.where[:-1, N] == 0).tolist():
         numbers = m.bodies.moments[b].tobytes(), float(m.bodies.mass[b])
         bodies.s[b], bodies.J[b], bodies.L[b] = _rigid_inertia(*numbers, int(m.bodies.where[b, NORMAL]))
-        bodies.inverse[b, 1] = _inverse(np.trace(bodies.J[b]))
+        xx, yy, zz = bodies.J[b].diagonal().tolist()
+        bodies.inverse[b, 1] = _inverse(xx + yy + zz)
 
 
 def _blank_work(m: Model, keeps_terms: bool, keeps_passed: bool) -> Work:
@@ -165,21 +215,25 @@ def _rigid_inertia(moments: bytes, mass: float, normal: int) -> tuple[Array, Arr
 
     Of its numbers in `Bodies`, by which the last bodies are known: every run of a scene asks for them again.
     """
-    first, (xx, yy, zz, xy, xz, yz) = np.split(np.frombuffer(moments), [3])
+    first = np.frombuffer(moments)[:3]
+    xx, yy, zz, xy, xz, yz = np.frombuffer(moments)[3:].tolist()
     J = np.array([[yy + zz, -xy, -xz], [-xy, xx + zz, -yz], [-xz, -yz, xx + yy]])
     M, s = np.zeros((6, 6)), skew(first)
     M[:3, :3].flat[::4] = mass
     M[:3, 3:], M[3:, :3], M[3:, 3:] = -s, s, J
     moving = list(range(6)) if normal < 0 else [*(c for c in range(3) if c != normal), 3 + normal]
+    own = M[moving][:, moving]
     try:
-        factor = np.linalg.cholesky(M[np.ix_(moving, moving)])
+        factor = np.linalg.cholesky(own)
     except np.linalg.LinAlgError:
         return first, J, np.full((6, 6), -1.0)
-    if (np.diag(factor) ** 2 <= LEAST_PIVOT * M[moving, moving]).any():
+    pivots = factor.diagonal()
+    if (pivots**2 <= LEAST_PIVOT * own.diagonal()).any():
         return first, J, np.full((6, 6), -1.0)
-    np.fill_diagonal(factor, 1.0 / np.diag(factor))
+    factor.flat[:: len(moving) + 1] = 1.0 / pivots
     L = np.eye(6)
-    L[np.ix_(moving, moving)] = factor
+    for row, k in zip(factor, moving, strict=True):
+        L[k, moving] = row
     return first, J, L
 
 
@@ -196,20 +250,6 @@ def _load_work(m: Model, V: int) -> LoadWork:
 
 def _identities(count: int) -> Array:
     return np.repeat(np.eye(3)[None], count, axis=0)
-
-
-def new_stages(system: System, states: int, rows: int = 0, numbers: Sequence[float] = (), kept: int = 0) -> Stages:
-    """Memory of an integrator: states (x, v), constraint rows, single numbers, and states at the starts of steps."""
-    place, C = system.layout, system.model.rows.kind.size
-    return Stages(
-        np.zeros((states, place.x_size)),
-        np.zeros((states, place.v_size)),
-        np.zeros((rows, C)),
-        np.zeros(C),
-        np.zeros((kept, place.x_size)),
-        np.zeros((kept, place.v_size)),
-        np.array(numbers, dtype=float),
-    )
 
 
 def new_record(system: System, rows: int) -> Record:

@@ -48,7 +48,8 @@ def add_rows(account: Account, rows: Record, powers: Array) -> None:
     energy, total = own + np.abs(stored), own + stored + rows.energy[:, 2]  # that of a negative stiffness is below zero
     if np.isnan(numbers[TIME]):
         numbers[:] = [rows.time[0], total[0], 0.0, 0.0, energy[0], 0.0, rows.time[0], power[0], power[0]]
-    steps = np.diff(rows.time, prepend=numbers[TIME])
+    times = np.append(numbers[TIME], rows.time)
+    steps = times[1:] - times[:-1]
     known = np.concatenate([numbers[[BEFORE, POWER]], power])
     work = numbers[WORK] + np.cumsum(0.5 * steps * (known[1:-1] + known[2:]))
     left_open = numbers[OPEN] + np.cumsum(steps * _left_open(known))
@@ -82,8 +83,8 @@ def amiss(account: Account, method: str, remedy: str) -> list[str]:
 def _left_open(known: Array) -> Array:
     """(T,) [W] what the trapezoid may be off in the interval that ends at each of the last T of T + 2 powers: by the second
     derivative where they are smooth, by all of a jump where they are not."""
-    growth = np.diff(known)
-    bend = np.abs(np.diff(growth))
+    growth = known[1:] - known[:-1]
+    bend = np.abs(growth[1:] - growth[:-1])
     smooth = bend < 0.5 * (np.abs(growth[1:]) + np.abs(growth[:-1]))
     return np.where(smooth, bend / 12, bend / 2)
 
@@ -101,7 +102,8 @@ def _stored(system: System, rows: Record) -> Array:
 def _power(system: System, rows: Record, powers: Array) -> Array:
     """(T,) [W] of all that neither stores energy nor is gravity, modal damping included."""
     counted = np.ones(powers.shape[1], bool)
-    counted[: len(forces_of(system.scene))] = [not _conserves(force) for force in forces_of(system.scene)]
+    own = [not _conserves(force) for force in forces_of(system.scene)]
+    counted[: len(own)] = own
     total: Array = powers[:, counted].sum(axis=1)
     for b, body in ((b, body) for b, body in enumerate(system.scene.bodies) if body.model.n):
         rates = rows.v[:, system.layout.q_dot(b)]

@@ -16,7 +16,7 @@ from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.consistency.assemble import Assembled
 from ffr_dyn.consistency.evaluation import evaluate, evaluator
 from ffr_dyn.consistency.explicit_forces import candidates, fastest, told
-from ffr_dyn.consistency.following import jump_of, row_named, unfollowed
+from ffr_dyn.consistency.following import jump_of, row_named, torn_open, unfollowed
 from ffr_dyn.consistency.validity import extremes, meaningless, strained, unstiffened
 from ffr_dyn.equations.inertia import kept_integrals, mass_matrix
 from ffr_dyn.integrators import Integrator
@@ -153,12 +153,16 @@ def _driven(view: View, driver: Driver | PointDriver) -> tuple[float, float]:
     return float(np.abs(off).max()), growth
 
 
-def between_rows(seen: Seen, system: System, work: Work, rows: Record) -> dict[str, list[str]]:
-    """Doubts about rows that steps have left open and a projection has closed: the one that was open most."""
+def between_rows(seen: Seen, system: System, work: Work, rows: Record | None = None) -> dict[str, list[str]]:
+    """Doubts about rows that steps have left open and a projection has closed: the one that was open most.
+
+    rows : whose speeds have not been looked at yet
+    """
     method, opened, time = seen.method, float(work.drift[PHI]), float(work.drift[MOMENT])
     if method is None or method.controlled or seen.apart == np.inf:
         return {}
-    if lost := unfollowed(system, work, method.step, rows):
+    step = method.step
+    if lost := torn_open(system, work, step) if rows is None else unfollowed(system, work, step, rows):
         return {APART: [lost.text]}
     if not opened > seen.tolerance:
         return {}
@@ -265,8 +269,9 @@ def _least(body: Body, moving: tuple[int, ...], q: Array) -> float:
     """The smallest eigenvalue of a mass matrix with ones on its diagonal; that of a rigid body is always the same."""
 
     def made() -> float:
-        M = mass_matrix(kept_integrals(body), q)[np.ix_(moving, moving)]
-        scale = 1.0 / np.sqrt(np.diag(M))
+        at = list(moving)
+        M = mass_matrix(kept_integrals(body), q)[at][:, at]
+        scale = 1.0 / np.sqrt(M.diagonal())
         return float(np.linalg.eigvalsh(scale[:, None] * M * scale)[0])
 
     return made() if q.size else remembered(body.model, ("least of mass", body.dropped, moving), made)

@@ -12,6 +12,7 @@ import numpy as np
 
 from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.equations.constraint_rows import Block, drive_of
+from ffr_dyn.equations.layout import angular_speeds
 from ffr_dyn.kernels.tables import MOMENT, OPENED, PHI, Record, Work
 from ffr_dyn.scene.joints import COINCIDENCE, DISTANCE, DOT_2, RELATION, Word
 from ffr_dyn.scene.scene import Scene
@@ -36,6 +37,11 @@ class Lost:
 
 def unfollowed(system: System, work: Work, step: float, rows: Record) -> Lost | None:
     """Where steps of a length [s] do not follow the motion up to these rows."""
+    return torn_open(system, work, step) or (_spun(system, step, rows) if system.scene.drivers else None)
+
+
+def torn_open(system: System, work: Work, step: float) -> Lost | None:
+    """Time and text of a joint that was open by too much at the end of a step."""
     opened, time = float(work.drift[PHI]), float(work.drift[MOMENT])
     block, word = row_named(system, int(work.drift[OPENED])) if opened > 0 else (None, None)
     if block is not None and word is not None and not opened <= LOST * _whole(system.scene, word):
@@ -45,15 +51,20 @@ def unfollowed(system: System, work: Work, step: float, rows: Record) -> Lost | 
             f"between the steps is more than the method follows; use steps far shorter than {step:.3g} s"
         )
         return Lost(time, text)
-    for b, body in enumerate(system.scene.bodies):
-        spins = np.linalg.norm(rows.v[:, system.layout.omega(b)], axis=1)
-        if system.scene.drivers and step * spins.max(initial=0.0) > SPUN:
-            time, spin = float(rows.time[np.argmax(spins)]), float(spins.max())
-            text = (
-                f"at t = {time:.6g} s body {body.name!r} turns by {step * spin:.3g} rad within a step of {step:.3g} s: the "
-                f"motion between the steps is more than the method follows; use a step below {0.1 / spin:.2g} s"
-            )
-            return Lost(time, text)
+    return None
+
+
+def _spun(system: System, step: float, rows: Record) -> Lost | None:
+    """Time and text of a body that turns by too much within a step."""
+    speeds = angular_speeds(system.layout, rows.v)
+    for b in np.flatnonzero(step * speeds.max(axis=0, initial=0.0) > SPUN)[:1].tolist():
+        row = int(np.argmax(speeds[:, b]))
+        time, spin, name = float(rows.time[row]), float(speeds[row, b]), system.scene.bodies[b].name
+        text = (
+            f"at t = {time:.6g} s body {name!r} turns by {step * spin:.3g} rad within a step of {step:.3g} s: the "
+            f"motion between the steps is more than the method follows; use a step below {0.1 / spin:.2g} s"
+        )
+        return Lost(time, text)
     return None
 
 

@@ -5,11 +5,13 @@ Both are looked at along the run and told at its end; a run stops for a deformat
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 
 import numpy as np
 
 from ffr_dyn.compile.scene_tables import System
+from ffr_dyn.equations.layout import angular_speeds
 from ffr_dyn.kernels.tables import Record
 from ffr_dyn.results.result import Result
 from ffr_dyn.scene.parts import owner
@@ -34,14 +36,11 @@ SPINNING = 0.03
 def extremes(system: System, record: Record) -> Array:
     """(3, B) of each body: the largest elastic rotation [rad] of one interface against another, the largest angular velocity
     [rad/s], the largest deflection of one against another over the size of the body."""
-    turns, spins, stretches = [], [], []
+    place, found = system.layout, np.zeros((3, len(system.scene.bodies)))
+    found[1] = angular_speeds(place, record.v).max(axis=0, initial=0.0)
     for b, body in enumerate(system.scene.bodies):
-        q, omega = record.x[:, system.layout.q(b)], record.v[:, system.layout.omega(b)]
-        turn, stretch = deflections(body.model, q)
-        turns.append(turn)
-        spins.append(np.linalg.norm(omega, axis=1).max(initial=0.0))
-        stretches.append(stretch)
-    return np.array([turns, spins, stretches])
+        found[::2, b] = deflections(body.model, record.x[:, place.q(b)])
+    return found
 
 
 def deflections(model: FlexibleBody, q: Array) -> tuple[float, float]:
@@ -51,8 +50,8 @@ def deflections(model: FlexibleBody, q: Array) -> tuple[float, float]:
     if not model.interfaces or not model.n:
         return 0.0, 0.0
     moved = remembered(model, "deflections", lambda: _between_points(model))
-    turn, shift = (np.linalg.norm(moved[:, :, k] @ q.T, axis=2).max(initial=0.0) for k in (0, 1))
-    return float(turn), float(shift / model.size) if model.size > 0 else 0.0
+    turn, shift = (math.sqrt(np.square(moved[:, :, k] @ q.T).sum(axis=2).max(initial=0.0)) for k in (0, 1))
+    return turn, shift / model.size if model.size > 0 else 0.0
 
 
 def _between_points(model: FlexibleBody) -> Array:

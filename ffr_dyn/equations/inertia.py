@@ -55,7 +55,7 @@ def kept_integrals(body: Body) -> Integrals:
 def _kept_integrals(body: Body) -> Integrals:
     model = body.model
     if not model.n:
-        none = model.P_dm, model.rP_dm, model.PP_dm, model.omega2, model.I5, model.I6
+        none = model.P_dm, model.rP_dm, model.PP_dm, model.omega2, np.zeros((3, 0, 0)), np.zeros((0, 0))
         return Integrals(model.mass, model.r_dm, model.rr_dm, *none, model.damping)
     kept = {term: float(term not in body.dropped) for term in INERTIA_TERMS}
     rP, PP = (
@@ -90,7 +90,8 @@ def moments(body: FlexibleBody | Integrals, q: Array) -> Moments:
 
 def inertia_tensor(moment: Moments) -> Array:
     """(3, 3) J of the deformed body about the origin of its frame. Equation (11) of docs/notation.md."""
-    return np.trace(moment.W) * np.eye(3) - moment.W
+    W = moment.W
+    return (W[0, 0] + W[1, 1] + W[2, 2]) * np.eye(3) - W
 
 
 def mass_matrix(body: FlexibleBody | Integrals, q: Array) -> Array:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import accumulate
 
 import numpy as np
 
@@ -58,8 +59,8 @@ class Layout(Brief):
 def layout(scene: Scene) -> Layout:
     """The slices of a scene."""
     n = tuple(body.model.n for body in scene.bodies)
-    ix = tuple(int(k) for k in np.cumsum([0, *(7 + k for k in n)]))
-    iv = tuple(int(k) for k in np.cumsum([0, *(6 + k for k in n)]))
+    ix = tuple(accumulate((7 + k for k in n), initial=0))
+    iv = tuple(accumulate((6 + k for k in n), initial=0))
     normals = [body_normal(b, AXES.index(scene.plane)) if scene.plane in AXES else -1 for b in scene.bodies]
     return Layout(n, ix[:-1], iv[:-1], ix[-1], iv[-1], tuple(normals))
 
@@ -71,6 +72,13 @@ def initial_state(scene: Scene, place: Layout) -> tuple[Array, Array]:
         x[place.R(b)], x[place.p(b)], x[place.q(b)] = body.position, body.rotation, body.q
         v[place.R_dot(b)], v[place.omega(b)], v[place.q_dot(b)] = body.velocity, body.omega_bar, body.q_dot
     return x, v
+
+
+def angular_speeds(place: Layout, v: Array) -> Array:
+    """Angular speeds (T, B) [rad/s] of all bodies, from velocities (T, V)."""
+    omega = v[:, np.add.outer(np.array(place.iv, dtype=int) + 3, np.arange(3))]
+    speeds: Array = np.sqrt((omega * omega).sum(axis=2))
+    return speeds
 
 
 def moved(place: Layout, x: Array, step: Array) -> Array:

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from matplotlib import colormaps
 
-from ffr_dyn.pictures.connections import Connections
+from ffr_dyn.pictures.connections import ArrowShown, Connections, SpreadShown
 from ffr_dyn.pictures.film import BODY_COLOURS, TRACE_COLOURS, Camera, Film, Link, Solid
 from ffr_dyn.pictures.morphs import MOST_SHAPES, MOST_TENSORS, beside, is_closed, morph, quadratic, sharp_edges
 from ffr_dyn.pictures.shades import Shade
@@ -174,18 +174,34 @@ def _beside(shown: Shown, numbers: _Numbers) -> Item:
     ]
     arrows = [
         {
-            "name": arrow.name,
-            "unit": arrow.unit,
+            "name": load.name,
+            "unit": load.unit,
             "shown": "forces" in shown.boxes,
-            "largest": float(np.linalg.norm(arrow.vector, axis=1).max()),
-            "at": numbers.keep(arrow.at, "h2"),
-            "vector": numbers.keep(arrow.vector, "h2"),
+            "largest": load.largest,
+            **(_spread(load, numbers) if isinstance(load, SpreadShown) else _at_point(load, numbers)),
         }
-        for arrow in beside.arrows
+        for load in beside.loads
     ]
     seen = "markers" in shown.boxes
     markers = [{"name": name, "shown": seen, "at": numbers.keep(at, "h2")} for name, at in beside.markers.items()]
     return {"joints": joints, "arrows": arrows, "markers": markers}
+
+
+def _at_point(arrow: ArrowShown, numbers: _Numbers) -> Item:
+    return {"at": numbers.keep(arrow.at, "h2"), "vector": numbers.keep(arrow.vector, "h2")}
+
+
+def _spread(load: SpreadShown, numbers: _Numbers) -> Item:
+    """A load on a surface, whose places move with the frame of the body and with its deformation."""
+    return {
+        "turns": load.in_body_axes,
+        "pose": numbers.keep(_poses(load.R, load.A)),
+        "at": numbers.keep(load.at),
+        "moved": numbers.keep(load.moved, "h2"),
+        "vector": numbers.keep(load.vector),
+        "inward": numbers.keep(load.inward),
+        "factor": numbers.keep(load.factor, "h2"),
+    }
 
 
 def _series(shown: Shown, numbers: _Numbers) -> list[Item]:

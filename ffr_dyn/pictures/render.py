@@ -37,7 +37,7 @@ from ffr_prep.common.arrays import Array
 pv: Any = importlib.import_module("pyvista")
 
 _FEATURE_ANGLE = 30.0
-_INK = "#222222"
+_INK, _FORCE, _MOMENT = "#222222", "#D55E00", "#0072B2"
 _MATTE: Any = {"ambient": 0.25, "diffuse": 0.8, "specular": 0.15, "specular_power": 20}
 # Share of the picture's width and height that the bodies may fill, and where its middle lies; the bar needs the rest.
 _FILL = (0.80, 0.82)
@@ -144,6 +144,9 @@ def _build(plotter: Any, shown: Film, faint: frozenset[str]) -> list[Update]:
     updates += [_tubes(plotter, link, next(plain), link.name in faint) for link in shown.links]
     for path, colour in zip(shown.traces.values(), TRACE_COLOURS * len(shown.traces), strict=False):
         plotter.add_mesh(pv.lines_from_points(path), color=colour, line_width=2.5, lighting=False)
+    for arrows, colour, heads in ((shown.forces, _FORCE, 1), (shown.moments, _MOMENT, 2)):
+        for begin, end in arrows[np.any(arrows[:, 0] != arrows[:, 1], axis=1)]:
+            plotter.add_mesh(_arrow(begin, end, heads), color=colour, **_MATTE)
     if shown.marks:
         _mark(plotter, shown)
     plotter.add_axes(line_width=2, color=_INK, viewport=(0.0, 0.0, 0.16, 0.2))
@@ -271,6 +274,18 @@ def _tubes(plotter: Any, link: Link, colour: str, faint: bool) -> Update:
             mesh.GetPoints().Modified()
 
     return update
+
+
+def _arrow(begin: Array, end: Array, heads: int) -> Any:
+    """An arrow between two points, of a moment with two heads."""
+    along = end - begin
+    length = float(np.linalg.norm(along))
+    thick = {"shaft_radius": 0.015, "tip_radius": 0.05, "tip_length": 0.16}
+    found = pv.Arrow(start=begin, direction=along, scale=length, **thick)
+    for k in range(1, heads):
+        head = {"height": 0.16 * length, "radius": 0.05 * length, "resolution": 20}
+        found = found.merge(pv.Cone(center=end - (0.08 + 0.13 * k) * along, direction=along, **head))
+    return found
 
 
 def _mark(plotter: Any, shown: Film) -> None:

@@ -14,7 +14,7 @@ from PIL import Image
 from ffr_dyn.consistency.assemble import assemble
 from ffr_dyn.consistency.evaluation import evaluator, record_states
 from ffr_dyn.functions.rotation import rotation_matrix
-from ffr_dyn.pictures.connections import Connections, JointShown, connections
+from ffr_dyn.pictures.connections import ArrowShown, Connections, JointShown, SpreadShown, connections
 from ffr_dyn.pictures.film import Camera, Film, camera_for, film_at
 from ffr_dyn.pictures.shades import shades
 from ffr_dyn.pictures.viewer import Viewer
@@ -199,8 +199,8 @@ def _all_connections(scene: Scene, result: Result) -> Connections:
     """Those of the result but for reactions, and a mark at every force that has no arrow."""
     told = result.attributes.get("connections", {})
     found = connections(result)
-    found = replace(found, arrows=tuple(of for of in found.arrows if "axis" not in told[of.name.rpartition(".")[0]]))
-    arrows = {arrow.name.rpartition(".")[0] for arrow in found.arrows}
+    found = replace(found, arrows=tuple(arrow for arrow in found.arrows if "axis" not in told[arrow.of]))
+    arrows = {arrow.of for arrow in found.loads}
     marks = [
         JointShown(name, "force", f"{name} ({of['kind']})", found.markers[of["at"][0]], None)
         for name, of in told.items()
@@ -241,7 +241,16 @@ def _film(seen: SceneView) -> Film:
     film = film_at(seen.shown, seen.shown.time, colour="body")
     lines = {**seen.apart, **dict(_lines(seen.shown, seen.beside.markers))}
     points = np.concatenate([film.corners, *seen.beside.markers.values()])
-    return replace(film, traces=lines, low=points.min(axis=0), high=points.max(axis=0))
+    film = replace(film, traces=lines, low=points.min(axis=0), high=points.max(axis=0))
+    ends = [of for _, arrows in _ends(seen, film.size) for of in arrows]
+    points = np.concatenate([points, *ends])
+    return replace(film, low=points.min(axis=0), high=points.max(axis=0))
+
+
+def _ends(seen: SceneView, size: float) -> Iterator[tuple[ArrowShown | SpreadShown, Array]]:
+    """Every load, and where its arrows begin and end (N, 2, 3) [m], strongest first."""
+    for load, length in seen.beside.lengths(size):
+        yield load, np.stack(load.ends(0, length), axis=1)
 
 
 def _page(seen: SceneView, film: Film, camera: Camera) -> str:
@@ -263,6 +272,8 @@ def _page(seen: SceneView, film: Film, camera: Camera) -> str:
 def _marked(seen: SceneView, film: Film) -> Film:
     """With names of joints and markers at their places, and axes of joints as lines."""
     named = [(joint.label, joint.at[0]) for joint in seen.beside.joints]
+    loads = list(_ends(seen, film.size))
+    named += [(f"{load.name} {load.largest:.4g} {load.unit}", arrows[0].mean(axis=0)) for load, arrows in loads]
     marks = dict(_merged([*named, *((marker, at[0]) for marker, at in seen.beside.markers.items())], film.size))
     reach = 0.06 * film.size
     axes = {
@@ -271,7 +282,13 @@ def _marked(seen: SceneView, film: Film) -> Film:
         if joint.axis is not None
     }
     heading = seen.trouble[:110] or str(seen.shown.attributes["title"])
-    return replace(film, marks=marks, traces={**film.traces, **axes}, heading=heading)
+    none = np.zeros((0, 2, 3))
+    moments, forces = (
+        np.concatenate([none, *(arrows for load, arrows in loads if (load.unit == "N m") is turns)])
+        for turns in (True, False)
+    )
+    paths = {**film.traces, **axes}
+    return replace(film, marks=marks, traces=paths, heading=heading, forces=forces, moments=moments)
 
 
 def _merged(places: Iterable[tuple[str, Array]], size: float) -> Iterator[tuple[str, Array]]:

@@ -50,6 +50,7 @@ DEFAULT_OUTPUTS = (
         "*.force",
         "*.moment",
         "*.effort",
+        "*.factor",
         "*.torque",
         "*.tension",
         "*.angle",

@@ -266,12 +266,16 @@ class View(Brief):
 
     def orientation(self, marker: int) -> Array:
         """(T, 4) Euler parameters of the marker's axes: those of its body, turned by the elastic rotation."""
+        return np.broadcast_to(self._attitudes(marker), (self.rows, 4))
+
+    def _attitudes(self, marker: int) -> Array:
+        """As `orientation`; (1, 4) on the ground."""
         return self._once(("orientation", marker), lambda: self._orientation(marker))
 
     def _orientation(self, marker: int) -> Array:
         owner = self._owner(marker)
         if owner is None:
-            return np.broadcast_to([1.0, 0.0, 0.0, 0.0], (self.rows, 4))
+            return np.array([[1.0, 0.0, 0.0, 0.0]])
         p = self.record.x[:, self.system.layout.p(owner[0])]
         return times(p, from_vectors(self._turned(*owner).value)) if self.system.layout.n[owner[0]] else p
 
@@ -293,8 +297,9 @@ class View(Brief):
         return self._once(("frame", marker, frame.tobytes()), lambda: self._frame(marker, frame))
 
     def _frame(self, marker: int, frame: Array) -> Array:
-        A = self._once(("marker axes", marker), lambda: rotation_matrix(self.orientation(marker)))
-        return A[:, :, 0, None] * frame[0] + A[:, :, 1, None] * frame[1] + A[:, :, 2, None] * frame[2]
+        A = self._once(("marker axes", marker), lambda: rotation_matrix(self._attitudes(marker)))
+        turned = A[:, :, 0, None] * frame[0] + A[:, :, 1, None] * frame[1] + A[:, :, 2, None] * frame[2]
+        return np.broadcast_to(turned, (self.rows, 3, 3))
 
     def frame_rate(self, marker: int, frame: Array) -> Array:
         """(T, 3, 3) time derivative of `frame`."""

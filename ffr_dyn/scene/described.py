@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
+from ffr_dyn.scene.couplings import Coupling, coupled
 from ffr_dyn.scene.drivers import Driver, PointDriver
 from ffr_dyn.scene.force_kinds import forces_of
 from ffr_dyn.scene.forces.given import is_number
-from ffr_dyn.scene.forces.load import Load
+from ffr_dyn.scene.forces.places import effort
 from ffr_dyn.scene.joints import Joint, frames
 from ffr_dyn.scene.parts import wholes
 from ffr_dyn.scene.scene import Scene
@@ -21,7 +23,8 @@ _WITHOUT_AXIS = ("spherical", "fixed", "distance", "orientation")
 def described(scene: Scene) -> dict[str, Any]:
     """Plain JSON values: the title; the `mass` [kg] of all bodies and a `length` [m], the largest radius of gyration about
     the origin of a body's frame, which tell what is small; the parts of bodies by the name of the whole; places (3,) of the
-    ground's points [m]; and by the name of a joint, driver or force the markers `at` which it is, and what of it is drawn.
+    ground's points [m]; and by the name of a joint, driver, coupling or force the markers `at` which it is, and what of it is
+    drawn.
     """
     parts = {name: [part.name for part in of] for name, of in wholes(scene.bodies).items()}
     ground = {name: at.tolist() for name, at in scene.ground.items()}
@@ -44,6 +47,7 @@ def _connections(scene: Scene) -> dict[str, Any]:
     for driver in scene.drivers:
         at = [driver.j] if isinstance(driver, PointDriver) else [joints[driver.joint].i, joints[driver.joint].j]
         found[driver.name] = {"kind": "point driver" if len(at) == 1 else "driver", "at": at, "axis": None}
+    found |= {coupling.name: _coupling(coupling, joints) for coupling in scene.couplings}
     return found | {force.name: _force(force, scene) for force in forces_of(scene)}
 
 
@@ -52,8 +56,19 @@ def _joint(joint: Joint, drivers: list[str]) -> dict[str, Any]:
     return {"kind": joint.kind, "at": [joint.i, joint.j], "axis": axis} | ({"drivers": drivers} if drivers else {})
 
 
+def _coupling(coupling: Coupling, joints: Mapping[str, Joint]) -> dict[str, Any]:
+    """The second bodies of its joints, and what it does to them."""
+    (first, way), (second, other) = coupled(coupling)
+    named = ((first, way, -coupling.ratio), (second, other, 1.0))
+    efforts = [
+        effort(joints[joint], of, "effort", factor) | {"name": f"{coupling.name}.effort on {joint}"}
+        for joint, of, factor in named
+    ]
+    return {"kind": "coupling", "at": [joints[first].j, joints[second].j], "efforts": efforts}
+
+
 def _force(force: Any, scene: Scene) -> dict[str, Any]:
-    """Its markers; of a load its axes, and what of it is constant and not zero, for scenes that have not run."""
+    """Its markers, what a picture needs beside, and what of it is constant and not zero, for scenes that have not run."""
     parts = {what: getattr(force, what, ()) for what in ("force", "moment")}
     constant = {
         what: [float(component) for component in of]
@@ -61,6 +76,4 @@ def _force(force: Any, scene: Scene) -> dict[str, Any]:
         if isinstance(of, tuple | list) and len(of) == 3 and all(map(is_number, of)) and any(of)
     }
     found: dict[str, Any] = {"kind": type(force).__name__, "at": list(force.place.markers(scene))}
-    return (
-        found | ({"axes": force.axes} if isinstance(force, Load) else {}) | ({"constant": constant} if constant else {})
-    )
+    return found | force.drawn(scene) | ({"constant": constant} if constant else {})

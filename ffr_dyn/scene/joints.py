@@ -62,9 +62,11 @@ def word(
     function: TimeFunction | None = None,
 ) -> Word:
     """A word on two markers."""
-    nothing = np.zeros(3)
-    axes = [axis_i, nothing if axis_i2 is None else axis_i2, nothing if axis_j is None else axis_j]
-    return Word(kind, text, np.array(axes, float), function)
+    axes = np.zeros((3, 3))
+    for k, axis in enumerate((axis_i, axis_i2, axis_j)):
+        if axis is not None:
+            axes[k] = axis
+    return Word(kind, text, axes, function)
 
 
 def relation(one: Term, other: Term, text: str, function: TimeFunction | None = None) -> Word:
@@ -97,9 +99,12 @@ def _spacing(one: Term, other: Term) -> float:
     return turns[0] / ratio.denominator
 
 
+_SAME_PLACE = [word(COINCIDENCE, f"same {'xyz'[c]}", np.array([c, 0.0, 0.0])) for c in range(3)]
+
+
 def coincide() -> list[Word]:
     """Both points at one place: three rows."""
-    return [word(COINCIDENCE, f"same {'xyz'[c]}", np.array([c, 0.0, 0.0])) for c in range(3)]
+    return [*_SAME_PLACE]
 
 
 def dot_1(frame_i: Array, a: int, frame_j: Array, b: int) -> Word:

@@ -106,8 +106,8 @@ class Body(Brief):
     @cached_property
     def _along(self) -> tuple[int, int, int]:
         """The body axes along the global ones, or -1."""
-        size = np.abs(self._axes)
-        x, y, z = (int(np.argmax(row)) if row.max() > 1 - 1e-12 else -1 for row in size)
+        size = np.abs(self._axes).tolist()
+        x, y, z = (row.index(max(row)) if max(row) > 1 - 1e-12 else -1 for row in size)
         return x, y, z
 
     def _title(self) -> str:
@@ -193,10 +193,14 @@ class Scene(Brief):
         return {f"{body}.{point}": k for k, (_, body, point) in enumerate(self._markers)}
 
     @cached_property
-    def _used(self) -> frozenset[str]:
-        """Names of the markers at which joints, driven points, loads, springs or bushings act."""
+    def _used(self) -> dict[str, tuple[str, ...]]:
+        """`used_interfaces` by the name of the body."""
         pairs: tuple[Any, ...] = (*self.joints, *(driver for driver in self.drivers if isinstance(driver, PointDriver)))
-        return frozenset((*loaded_markers(self), *(end for pair in pairs for end in (pair.i, pair.j))))
+        at = {*loaded_markers(self), *(end for pair in pairs for end in (pair.i, pair.j))}
+        return {
+            body.name: tuple(i.name for i in body.model.interfaces if f"{owner(body)}.{i.name}" in at)
+            for body in self.bodies
+        }
 
     def __post_init__(self) -> None:
         for key, kinds in _DECLARATIONS.items():
@@ -277,8 +281,7 @@ def marker_names(scene: Scene) -> tuple[str, ...]:
 
 def used_interfaces(scene: Scene, body: Body) -> tuple[str, ...]:
     """The interfaces of a body at which joints, driven points, loads, springs or bushings act."""
-    names = ((i.name, f"{owner(body)}.{i.name}") for i in body.model.interfaces)
-    return tuple(own for own, name in names if name in scene._used)
+    return scene._used[body.name]
 
 
 def marker_number(scene: Scene, name: str) -> int:

@@ -26,25 +26,30 @@ from __future__ import annotations
 import hashlib
 import json
 import math
+import os
 import re
 import shlex
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
+import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from ffr_dyn.functions.formula import TIME, names_in, parse
 from ffr_dyn.scene_file.assignments import unknown
 from ffr_dyn.scene_file.parameters import flattened, nearest, substituted
 from ffr_dyn.scene_file.read import body_files
 from ffr_dyn.scene_file.source import read_source
-from ffr_dyn.studies.measures import Measured, measured
+from ffr_dyn.studies.measures import HISTORY, Measured, measured
+from ffr_dyn.studies.runs import body_file
 from ffr_dyn.studies.sampling import USUAL, Axis, Sampling, Spread, Value, points, spaced
-from ffr_prep.common.brief import Brief
+from ffr_prep.common.brief import Brief, cut
 from ffr_prep.common.entries import places_of
 from ffr_prep.common.errors import InputError
 from ffr_prep.common.reading import read_toml
+from ffr_prep.common.units import split_quantity
 
 MAKING = ("reduce", "reduce-structure", "reduce-matrices")
 TAKEN = ("run", "row", "time", "message")  # columns that every table may have
@@ -163,6 +168,7 @@ def study(
         raise InputError("parameters: there are none; name at least one with its values, such as load = [10, 50]")
     if not outputs:
         raise InputError('outputs: there are none; name at least one, such as force = "pin.force: largest"')
+    _check_settings(parameters, points_are, samples, sampling, seed)
     made = Study(
         Path(scene),
         points(
@@ -176,6 +182,20 @@ def study(
     )  # fmt: skip
     _check(made)
     return made
+
+
+def _check_settings(parameters: Mapping[str, Any], points_are: str, samples: int, sampling: str, seed: int) -> None:
+    """InputError for settings that no study can have, or that change nothing."""
+    for name, given, known in (("points", points_are, ("grid", "list")), ("sampling", sampling, get_args(Sampling))):
+        if given not in known:
+            raise InputError(f"{name} is {given!r}; {nearest(str(given), dict.fromkeys(known))}")
+    for name, number in (("samples", samples), ("seed", seed)):
+        if type(number) is not int or number < 0:
+            raise InputError(f"{name} is {number!r}; give a whole number, 0 or more")
+    if samples and not any(isinstance(_values(name, given), Spread) for name, given in _leaves(parameters)):
+        raise InputError(
+            f"samples = {samples} changes nothing: no parameter has a distribution such as {{uniform = [1, 3]}}; leave it out"
+        )
 
 
 def _hint(where: str) -> str:
@@ -203,14 +223,21 @@ def _are_numbers(given: Sequence[Any]) -> bool:
     return all(isinstance(one, (int, float)) and not isinstance(one, bool) and abs(one) < math.inf for one in given)
 
 
+def _is_value(one: Any) -> bool:
+    """A text, or a number that is finite."""
+    return isinstance(one, str) or (_are_numbers((one,)) and math.isfinite(one))
+
+
 def _values(name: str, given: Any) -> Axis | Spread:
     """The values of a parameter. Raises InputError for an entry without any."""
     if isinstance(given, (Axis, Spread)):
         return given
-    if isinstance(given, str) or _are_numbers([given]):
-        return Axis((given,))
-    if isinstance(given, (list, tuple)) and given and all(isinstance(one, str) or _are_numbers([one]) for one in given):
-        return Axis(tuple(given))
+    if isinstance(given, (np.ndarray, np.generic)):
+        given = given.tolist()
+    listed = given if isinstance(given, (list, tuple)) else [given]
+    listed = [one.item() if isinstance(one, np.generic) else one for one in listed]
+    if listed and all(map(_is_value, listed)):
+        return Axis(tuple(listed))
     if isinstance(given, Mapping) and {"from", "to", "count"} <= given.keys() <= {"from", "to", "count", "spacing"}:
         return _range(name, given)
     if isinstance(given, Mapping) and len(given) == 1 and "from" not in given:
@@ -218,8 +245,8 @@ def _values(name: str, given: Any) -> Axis | Spread:
         if isinstance(numbers, list) and _are_numbers(numbers):
             return Spread(kind, tuple(map(float, numbers)))
     raise InputError(
-        f"parameters.{name} = {given!r}: give [1, 2, 3], {{from = 1, to = 3, count = 5}}, or a distribution such as "
-        "{normal = [mean, deviation]}"
+        f"parameters.{name} = {cut(repr(given))}: give finite numbers or texts such as [1, 2, 3], {{from = 1, to = 3, "
+        "count = 5}, or a distribution such as {normal = [mean, deviation]}"
     )
 
 
@@ -254,6 +281,7 @@ def _check(made: Study) -> None:
             raise InputError(f"the parameter {name!r} changes nothing: nothing in {made.scene} uses it; leave it out")
     _check_overlap(made.parameters)
     _check_names(made)
+    _check_formulas(made)
     _check_bodies(made)
 
 
@@ -261,11 +289,29 @@ def _check_names(made: Study) -> None:
     """InputError for names of columns that are there twice, or that every table has."""
     names = [*made.parameters, *(one.name for one in made.outputs)]
     for name in names:
-        if name in TAKEN or "/" in name or names.count(name) > 1:
+        if name in TAKEN or not name.strip(" .") or {"/", "\0"} & set(name) or names.count(name) > 1:
             raise InputError(
-                f"{name!r} cannot be a column of the table: a parameter or an output has that name already, or it has '/' or "
-                f"is one of {', '.join(TAKEN)}; give it another"
+                f"{name!r} cannot be a column of the table: a parameter or an output has that name already, or it is empty, "
+                f"has '/', or is one of {', '.join(TAKEN)}; give it another"
             )
+
+
+def _check_formulas(made: Study) -> None:
+    """InputError for a formula that no run can work out: of names that there are not, of time, of itself."""
+    formulas = {one.name: one.quantity for one in made.outputs if one.how == "="}
+    numbers = [one.name for one in made.outputs if one.how != HISTORY]
+    known = dict.fromkeys([*made.parameters, *numbers], TIME)  # a function that is no constant: nothing is worked out
+    for name, text in formulas.items():
+        found = parse(text, known, f"outputs.{name}") if split_quantity(text) is None else TIME
+        if strange := next(names_in(found), "t" if "t" not in known and _mentions(text, "t") else None):
+            raise InputError(
+                f"outputs.{name} = '= {text}': {strange!r} is no output and no parameter; {nearest(strange, known)}"
+            )
+    while formulas:
+        ready = [name for name, text in formulas.items() if not any(_mentions(text, other) for other in formulas)]
+        if not ready:
+            raise InputError(f"outputs: the formulas of {', '.join(formulas)} depend on themselves")
+        formulas = {name: text for name, text in formulas.items() if name not in ready}
 
 
 def _check_overlap(names: Sequence[str]) -> None:
@@ -330,11 +376,16 @@ def recipe(made: Study, body: str, point: Mapping[str, Value]) -> str:
 
 
 def mark(made: Study) -> str:
-    """The mark that tells a study from another: its points, outputs and recipes, and the text of its scene."""
+    """The mark that tells a study from another: its points, outputs and recipes, its scene, and the files that these name."""
+    tree = read_source(made.scene).tree
+    said = {*_texts(tree), *(value for point in made.points for value in point.values() if isinstance(value, str))}
+    files = {text: made.scene.parent / text for text in said if os.path.isfile(made.scene.parent / text)}
     whole = [
         [sorted(point.items()) for point in made.points],
         [[one.name, one.quantity, one.how] for one in made.outputs],
-        sorted(made.recipes.items()),
-        read_source(made.scene).tree,
+        sorted((name, line, body_file(line, made.folder, Path()).name) for name, line in made.recipes.items()),
+        tree,
+        {text: hashlib.sha256(file.read_bytes()).hexdigest() for text, file in files.items()},
+        made.histories,
     ]
     return hashlib.sha256(json.dumps(whole, sort_keys=True, default=str).encode()).hexdigest()

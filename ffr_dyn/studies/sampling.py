@@ -47,7 +47,8 @@ class Spread:
     def at(self, share: Array) -> Array:
         """Quantiles. Raises InputError for a distribution that there is not, or numbers that it does not take."""
         try:
-            found: Array = np.asarray(self._frozen().ppf(share), dtype=float)
+            with np.errstate(all="ignore"):
+                found: Array = np.asarray(self._frozen().ppf(share), dtype=float)
         except (TypeError, ValueError) as error:
             raise InputError(f"{self.kind} {list(self.numbers)}: {error}") from None
         if not np.isfinite(found).all():
@@ -71,6 +72,10 @@ class Spread:
             raise InputError(
                 f"there is no distribution {self.kind!r}; there are {', '.join(USUAL)} and those of scipy.stats"
             )
+        shapes = [] if made.shapes is None else made.shapes.split(", ")
+        if not len(shapes) <= len(n) <= len(shapes) + 2:
+            takes = ", ".join([*shapes, "loc", "scale"])
+            raise InputError(f"{self.kind} takes [{takes}], and {len(n)} numbers are given")
         return made(*n)
 
 
@@ -86,6 +91,8 @@ def spaced(start: float, end: float, count: int, *, logarithmic: bool = False) -
     """So many values from start to end. Raises InputError where there are none."""
     if count < 1 or count > MOST:
         raise InputError(f"there cannot be {count} values on an axis; give 1 to {MOST}")
+    if not math.isfinite(end - start):
+        raise InputError(f"there are no finite values from {start:g} to {end:g}")
     if logarithmic and not (start > 0 and end > 0):
         raise InputError(f"spacing by logarithms wants values above zero, not from {start:g} to {end:g}")
     values = np.geomspace(start, end, count) if logarithmic else np.linspace(start, end, count)

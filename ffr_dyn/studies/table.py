@@ -18,7 +18,7 @@ from typing import Any, Self
 import h5py
 import numpy as np
 
-from ffr_dyn.studies.measures import HISTORY, TIME
+from ffr_dyn.studies.measures import HISTORY, TIME, Number
 from ffr_dyn.studies.plan import Study, mark
 from ffr_dyn.studies.runs import Row
 from ffr_prep.common.arrays import Array
@@ -31,7 +31,7 @@ from ffr_prep.common.reading import reading
 
 RUN, ROW = "run", "row"
 MESSAGE = "message"
-SECTION = "ffr_study"
+SECTION, FORMAT = "ffr_study", 1
 
 
 @dataclass(frozen=True, repr=False)
@@ -176,10 +176,14 @@ class Journal:
 
 def _row(entry: Mapping[str, Any], runs: int, outputs: Set[str]) -> Row:
     """A line of the journal. Raises ValueError or KeyError for what no run of the study can have left."""
-    number, values = int(entry["run"]), {str(name): float(value) for name, value in entry["values"].items()}
-    if not (0 <= number < runs and values.keys() <= outputs):
+    number, values = int(entry["run"]), {str(name): _number(value) for name, value in entry["values"].items()}
+    if not (0 <= number < runs and values.keys() <= outputs | {TIME}):
         raise ValueError(number)
     return Row(number, values, str(entry["message"]))
+
+
+def _number(value: Any) -> Number:
+    return [float(one) for one in value] if isinstance(value, list) else float(value)
 
 
 # ---- the file -------------------------------------------------------------------------------------------------------
@@ -188,7 +192,7 @@ def _row(entry: Mapping[str, Any], runs: int, outputs: Set[str]) -> Row:
 def save_table(made: Table, path: str | Path) -> None:
     """Write a table (netCDF-4), whole or not at all."""
     with replacing(path) as part, new_file(part) as file:
-        file.attrs[SECTION] = 1
+        file.attrs[SECTION] = FORMAT
         _variable(file, RUN, np.arange(len(made), dtype=np.int64)).make_scale(RUN)
         if TIME in made.outputs:
             _variable(file, ROW, np.arange(made.outputs[TIME].shape[1], dtype=np.int64)).make_scale(ROW)
@@ -222,6 +226,11 @@ def _read(path: Path) -> Table:
     with h5py.File(path, "r", locking=False) as file:
         if SECTION not in file.attrs:
             raise InputError(f"{path} is not the table of a study; ffr-dyn sweep writes one")
+        if file.attrs[SECTION] != FORMAT:
+            raise InputError(
+                f"{path} is a table of format {file.attrs[SECTION]}, and this version reads format {FORMAT}: use the version "
+                "that wrote it, or sweep again"
+            )
         found = {name: _values(data) for name, data in file.items() if name not in (RUN, ROW, MESSAGE)}
         parameters = {name: values for name, values in found.items() if "parameter" in file[name].attrs}
         outputs = {name: values for name, values in found.items() if name not in parameters}

@@ -94,7 +94,7 @@ class Crew:
 @contextmanager
 def crew(count: int) -> Iterator[Crew]:
     """So many workers, which end with the block. InputError for a number that is none."""
-    if count < 1:
+    if type(count) is not int or count < 1:
         raise InputError(f"there cannot be {count} workers; give 0 for this process, or how many")
     made = Crew(count)
     try:

@@ -7,6 +7,7 @@ eigenvectors of this part set them apart.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import replace
 
@@ -26,15 +27,15 @@ TURNED = 1e-12  # of a mode of norm one
 def size_of(body: FlexibleBody) -> float:
     """[m] the radius of gyration of a body about its origin."""
     xx, yy, zz = body.rr_dm.diagonal().tolist()
-    return float(np.sqrt((xx + yy + zz) / body.mass))
+    return math.sqrt((xx + yy + zz) / body.mass)
 
 
 def levelled(scene: Scene, normal: int) -> Scene:
     """The scene with places that are used in the middle plane of their body, and bodies at one height, where only a hair is
     missing; itself where nothing is."""
     near = BESIDE * max(size_of(body.model) for body in scene.bodies)
-    declared = [*(body.position[normal] for body in scene.bodies), *(p[normal] for p in scene.ground.values())]
-    heights = _merged(declared, near)
+    places = [*(body.position for body in scene.bodies), *scene.ground.values()]
+    heights = _merged([float(place[normal]) for place in places], near)
     bodies = tuple(_flat(scene, body, body_normal(body, normal), normal, next(heights)) for body in scene.bodies)
     ground = {name: _with(point, normal, next(heights)) for name, point in scene.ground.items()}
     changed = [new is not old for new, old in zip(bodies, scene.bodies, strict=True)]
@@ -44,11 +45,10 @@ def levelled(scene: Scene, normal: int) -> Scene:
 
 def _merged(heights: list[float], near: float) -> Iterator[float]:
     """The heights, those that are near to each other made equal."""
-    order, last = np.argsort(heights, kind="stable"), -np.inf
-    merged = np.array(heights, float)
-    for k in order:
+    merged, last = list(heights), -math.inf
+    for k in sorted(range(len(heights)), key=heights.__getitem__):
         last = merged[k] = last if merged[k] - last <= near else merged[k]
-    return iter(merged.tolist())
+    return iter(merged)
 
 
 def _with(point: Array, axis: int, value: float) -> Array:
@@ -82,8 +82,10 @@ def _without_hairs(model: FlexibleBody, k: int, used: tuple[str, ...]) -> Flexib
 def basis_in_plane(body: Body, k: int) -> Array | None:
     """(n, n) double modes of a body combined into those in the plane across body axis k and those across it, each in the
     place of the one it is most of; None where nothing is to be turned."""
+    if not body.model.n:
+        return None
     V = np.eye(body.model.n)
-    for group in _groups(body) if body.model.n else ():
+    for group in _groups(body):
         vectors = np.linalg.eigh(body.model.PP_dm[k, k][np.ix_(group, group)])[1]
         if np.abs(vectors).max(axis=0).min() < 1.0 - TURNED:
             V[np.ix_(group, group)] = vectors * np.sign(vectors[np.abs(vectors).argmax(axis=0), range(len(group))])

@@ -22,6 +22,7 @@ from ffr_dyn.scene.scene import Body, Scene, altered, used_interfaces
 from ffr_dyn.variants.families import by_family
 from ffr_dyn.variants.variant import with_basis
 from ffr_prep.body import FlexibleBody, idle_loads, mean_axis_form, remembered
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 
 HELD = 1e-9  # of a unit mode: what rounding moves a held place by
@@ -44,18 +45,23 @@ def _converted(scene: Scene, body: Body) -> Body:
     if body.frame or not (body.model.n and body.stiffening and body.model.stiffening is not None):
         return body
     _check_known(scene, body)
-    if _is_mean_axis(body.model):
+    form = remembered(body.model, "mean-axis form by family", lambda: _form(body.model))
+    if form is None:
         return body
-    model, frame = remembered(body.model, "mean-axis form by family", lambda: _form(body.model))
-    by_frequency = np.argsort(np.argsort(model.omega2, kind="stable"))
+    model, frame, by_frequency = form
     return _moved(altered(body, model=model, frame=frame, damping=body.damping[by_frequency]))
 
 
-def _form(model: FlexibleBody) -> tuple[FlexibleBody, OwnFrame]:
-    """The mean-axis form with its coordinates family by family, in which products are found soonest."""
+def _form(model: FlexibleBody) -> tuple[FlexibleBody, OwnFrame, Array] | None:
+    """The mean-axis form with its coordinates family by family, in which products are found soonest, and their numbers by
+    frequency; None of a body that is in its form already."""
+    if _is_mean_axis(model):
+        return None
     form = mean_axis_form(model)
     V = np.eye(form.body.n)[:, by_family(form.body)]
-    return with_basis(form.body, V), OwnFrame(model, form.frame, form.C).combined(V)
+    made = with_basis(form.body, V)
+    by_frequency = np.argsort(np.argsort(made.omega2, kind="stable"))
+    return made, OwnFrame(model, form.frame, form.C).combined(V), by_frequency
 
 
 def _moved(body: Body) -> Body:

@@ -9,6 +9,7 @@ and a revolute joint two rows. What a mesh leaves of symmetry and places counts 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import fields, replace
 from functools import partial
@@ -19,6 +20,7 @@ import numpy as np
 from ffr_dyn.functions.time_functions import is_zero
 from ffr_dyn.scene.drivers import PointDriver
 from ffr_dyn.scene.force_kinds import forces_of, in_bases
+from ffr_dyn.scene.forces.places import LEVEL, OnJoint
 from ffr_dyn.scene.own_frame import OwnFrame
 from ffr_dyn.scene.scene import Body, Scene, altered, body_normal, marker_number, undeformed, used_interfaces
 from ffr_dyn.variants.aligned import BESIDE, basis_in_plane, combined, levelled, size_of
@@ -37,6 +39,7 @@ _MIXED = 1e-12  # of a mode of norm one
 # What the search for a plane understands; a scene with anything else is planar only when it is declared so.
 _KNOWN = {"bodies", "joints", "drivers", "couplings", "loads", "springs", "forces", "ground"}
 _KNOWN |= {"gravity", "base_acceleration", "measurements", "name", "plane"}
+_OTHERS = [field.name for field in fields(Scene) if field.name not in _KNOWN]
 
 
 def planar_forms(scene: Scene) -> Iterator[Scene]:
@@ -129,7 +132,7 @@ def _form_in_plane(
 
 def _ratios(body: Body) -> bytes:
     """The part of the damping of a body that tells double modes apart: empty where all ratios are one."""
-    return body.damping.tobytes() if np.ptp(body.damping) else b""
+    return body.damping.tobytes() if len(set(body.damping.tolist())) > 1 else b""
 
 
 # ---- what stands in the way ---------------------------------------------------------------------------------------
@@ -137,7 +140,7 @@ def _ratios(body: Body) -> bytes:
 
 def _across(scene: Scene, normal: int) -> Iterator[str]:
     """The reasons why a planar motion is impossible, in words."""
-    if abs(scene.gravity[normal]) > _NOTHING * np.linalg.norm(scene.gravity):
+    if _has_part(scene.gravity, normal):
         yield f"gravity has the component {scene.gravity[normal]:g} m/s^2 along it"
     if not is_zero(scene.base_acceleration[normal]):
         yield "base_acceleration has a component along it"
@@ -145,15 +148,24 @@ def _across(scene: Scene, normal: int) -> Iterator[str]:
         k = body_normal(body, normal)
         if k < 0:
             yield f"no axis of the frame of body {body.name!r} is along it"
-        elif body.velocity.any() and abs(body.velocity[normal]) > _NOTHING * np.linalg.norm(body.velocity):
+        elif _has_part(body.velocity, normal):
             yield f"body {body.name!r} starts with a velocity along it"
         elif not body.omega_bar.any():
             continue
         elif np.abs(np.delete(body.omega_bar, k)).max() > _NOTHING * np.linalg.norm(body.omega_bar):
             yield f"body {body.name!r} starts with an angular velocity across it"
     for driver in scene.drivers:
-        if isinstance(driver, PointDriver) and (driver.x, driver.y, driver.z)[normal] is not None:
-            yield f"driver {driver.name!r} prescribes a motion along it"
+        if isinstance(driver, PointDriver):
+            if (driver.x, driver.y, driver.z)[normal] is not None:
+                yield f"driver {driver.name!r} prescribes a motion along it"
+        elif not OnJoint(driver.name, driver.joint, driver.coordinate).stays_in_plane(scene, normal):
+            yield f"driver {driver.name!r} prescribes a motion across it"
+
+
+def _has_part(vector: Array, k: int) -> bool:
+    """Whether a component of a vector is more than nothing."""
+    numbers: list[float] = vector.tolist()
+    return abs(numbers[k]) > _NOTHING * math.hypot(*numbers)
 
 
 def _obstacles(scene: Scene, normal: int) -> Iterator[str]:
@@ -164,7 +176,7 @@ def _obstacles(scene: Scene, normal: int) -> Iterator[str]:
 
 def _leaving(scene: Scene, normal: int) -> Iterator[str]:
     """The loads that may take the motion out of the plane, or make reactions that a planar scene does not have."""
-    if any(f.name not in _KNOWN and getattr(scene, f.name) for f in fields(scene)):
+    if any(getattr(scene, name) for name in _OTHERS):
         yield "there are forces of other kinds"
     for body in scene.bodies:
         k = body_normal(body, normal)
@@ -175,7 +187,7 @@ def _leaving(scene: Scene, normal: int) -> Iterator[str]:
             yield f"force {force.name!r} may act across"
     for joint in scene.joints:
         i, j = (undeformed(scene, marker_number(scene, name))[normal] for name in (joint.i, joint.j))
-        if round(abs(i - j), 9) > 0:
+        if abs(i - j) > LEVEL:
             yield f"joint {joint.name!r} runs aslant: its points are {abs(i - j):.3g} m apart along the normal"
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -38,14 +39,28 @@ def rigid_body(
     if tensor.shape != (3, 3):
         raise BodyError(f"body {name!r}: inertia must be (3,) or (3, 3), not {np.shape(inertia)}")
     c = np.asarray(centre_of_mass, float)
+    if c.shape != (3,):
+        raise BodyError(f"body {name!r}: centre_of_mass must be (3,), not {c.shape}")
     if not np.abs([mass, *tensor.ravel(), *c.ravel()]).max() < _MOST:
         raise BodyError(
             f"body {name!r}: mass {mass:g} kg, inertia and centre of mass must be finite; give them in SI units"
         )
-    for key, at in (points or {}).items():
+    places = {key: np.asarray(at, float) for key, at in (points or {}).items()}
+    for key, at in places.items():
         check_point(f"body {name!r}: point", key, at)
-    about_origin = tensor + mass * (c @ c * np.eye(3) - np.outer(c, c))
-    nothing = np.zeros((3, 0))
+    numbers = tuple((key, at.shape, at.tobytes()) for key, at in places.items())
+    made = _rigid(name, float(mass), tensor.tobytes(), c.tobytes(), numbers)
+    return made if surface is None else replace(made, surface=surface)
+
+
+@lru_cache(256)
+def _rigid(
+    name: str, mass: float, inertia: bytes, centre: bytes, points: tuple[tuple[str, tuple[int, ...], bytes], ...]
+) -> FlexibleBody:
+    """Rigid body; the last ones are known by their numbers: runs of a study share a crank, and what follows from it."""
+    tensor, c = np.frombuffer(inertia).reshape(3, 3), np.frombuffer(centre)
+    about_origin, nothing = tensor + mass * (c @ c * np.eye(3) - np.outer(c, c)), np.zeros((3, 0))
+    places = ((key, np.frombuffer(at).reshape(shape)) for key, shape, at in points)
     return FlexibleBody(
         name=name,
         mass=mass,
@@ -55,8 +70,7 @@ def rigid_body(
         rP_dm=np.zeros((3, 3, 0)),
         PP_dm=np.zeros((3, 3, 0, 0)),
         omega2=np.zeros(0),
-        interfaces=tuple(Interface(key, np.asarray(at, float), nothing, nothing) for key, at in (points or {}).items()),
-        surface=surface,
+        interfaces=tuple(Interface(key, at, nothing, nothing) for key, at in places),
         provenance={"kind": "rigid"},
     )
 

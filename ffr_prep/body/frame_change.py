@@ -51,8 +51,9 @@ def in_motions(body: FlexibleBody, Z: Array, omega2: Array, stiffening: Array | 
 
 def mass_of_motions(body: FlexibleBody) -> Array:
     """(6 + n, 6 + n)."""
-    M, turned = np.eye(6 + body.n), (turns() @ body.r_dm).T
-    M[:3, :3].flat[::4] = body.mass
+    M, (x, y, z) = np.eye(6 + body.n), body.r_dm.tolist()
+    turned = np.array([[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]])
+    M[[0, 1, 2], [0, 1, 2]] = body.mass
     M[:3, 3:6], M[3:6, :3], M[3:6, 3:6] = turned, turned.T, body.inertia
     M[:3, 6:], M[3:6, 6:] = body.P_dm, body.I4
     M[6:, :6] = M[:6, 6:].T

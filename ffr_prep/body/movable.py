@@ -6,6 +6,7 @@ mass makes that zero or negative; integrals of files that lump masses, or leave 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -34,9 +35,10 @@ def immovable(body: FlexibleBody, active: Sequence[int] = range(6)) -> str:
     'turning about x: it has none'
     """
     M, rigid = mass_of_motions(body), list(active)
-    own, coupled = M[np.ix_(rigid, rigid)], M[np.ix_(rigid, range(6, 6 + body.n))]
-    reach = np.sqrt(max(np.trace(body.rr_dm), 0.0)) or np.sqrt(body.mass)
-    scale = np.where(np.array(rigid) < 3, np.sqrt(body.mass), reach)
+    own, coupled = M[rigid][:, rigid], M[rigid, 6:]
+    heavy = math.sqrt(body.mass)
+    reach = math.sqrt(max(sum(body.rr_dm.diagonal().tolist()), 0.0)) or heavy
+    scale = np.array([heavy if c < 3 else reach for c in rigid])
     scaled = own / np.outer(scale, scale)
     values, vectors = np.linalg.eigh(scaled)
     if values[0] <= _NOTHING:

@@ -239,7 +239,7 @@ class FlexibleBody(Brief):
 
     # ---- sizes and rigid-body quantities -------------------------------------------------------------------------
 
-    @property
+    @cached_property
     def n(self) -> int:
         """Number of elastic coordinates."""
         return int(self.omega2.size)
@@ -265,7 +265,8 @@ class FlexibleBody(Brief):
     @property
     def inertia(self) -> Array:
         """(3, 3) undeformed inertia tensor about the origin of the body frame [kg m^2] (I7)."""
-        return np.trace(self.rr_dm) * np.eye(3) - self.rr_dm
+        xx, yy, zz = self.rr_dm.diagonal().tolist()
+        return np.diag([xx + yy + zz] * 3) - self.rr_dm
 
     @property
     def central_inertia(self) -> Array:

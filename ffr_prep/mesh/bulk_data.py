@@ -2,7 +2,7 @@
 
 A card is a name and its fields; a field is a text, "" where it is blank. Small fields are ten of eight columns, large ones (a
 name with *) six of which four have sixteen, free ones stand between commas. A line whose first field is blank, or begins with
-+ or *, goes on with the card above it; the marks of continuation say nothing more and are passed over.
++ or *, goes on with a card: with that one whose last line ends with the same mark, wherever it stands, else with the last.
 
 Source: MSC Nastran Quick Reference Guide, section 5 (format of bulk data entries).
 """
@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from ffr_prep.common.errors import InputError
@@ -20,16 +20,18 @@ from ffr_prep.common.reading import check_ordinary, read_text
 # 1.5, 1.5E3, 1.5D3, 1.5+3; and 15, which a real field may hold as well
 _REAL = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+))(?:[EeDd]?([+-]\d+)|[EeDd](\d+))?")
 _BEGIN = re.compile(r"^\s*BEGIN\s*(?:BULK)?\b.*$", re.MULTILINE | re.IGNORECASE)
+_PARAMETER = re.compile(r"\s*PARAM\s*,", re.IGNORECASE)
 _INCLUDE = re.compile(r"\s*INCLUDE\s+'?\"?([^'\"]+)", re.IGNORECASE)
 
 
 @dataclass
 class Card:
-    """A name in capitals, its data fields in turn, and the line on which it begins."""
+    """A name in capitals, its data fields in turn, the line on which it begins, and the mark of what goes on with it."""
 
     name: str
     fields: list[str]
     line: int
+    mark: str = field(default="", compare=False)
 
     def __str__(self) -> str:
         return f"line {self.line}: {self.name} {self.fields[0] if self.fields else ''}".rstrip()
@@ -59,7 +61,7 @@ class Card:
 
 
 def cards(path: Path, above: tuple[Path, ...] = ()) -> Iterator[Card]:
-    """The cards of a file, through the files that it includes; control before the bulk data is passed over.
+    """The cards of a file, through the files that it includes; of the control before the bulk data the parameters alone.
 
     Raises InputError for a file that cannot be read, includes itself, or begins with a continuation.
     """
@@ -67,29 +69,72 @@ def cards(path: Path, above: tuple[Path, ...] = ()) -> Iterator[Card]:
     bulk = list(_BEGIN.finditer(text))
     first = text.count("\n", 0, bulk[0].end()) + 1 if bulk else 0
     card: Card | None = None
-    for number, line in enumerate(text.splitlines()[first:], start=first + 1):
+    waiting: dict[str, Card] = {}  # by the marks with which they end
+    early: dict[str, Card] = {}  # what goes on with a card that is not there yet, by the marks with which it begins
+    lines = text.splitlines()
+    for number, line in enumerate(lines[:first], start=1):
+        if _PARAMETER.match(line):
+            name, fields, _ = _fields(line.partition("$")[0].strip(), f"{path}: line {number}")
+            yield Card(name.upper(), fields, number)
+    for number, line in enumerate(lines[first:], start=first + 1):
         plain = line.partition("$")[0].rstrip().expandtabs(8)
         if not plain:
             continue
         if found := _INCLUDE.match(plain):
-            if card:
-                yield card
+            yield from _put_away(card, waiting)
             card = None
             yield from _included(path, found[1].strip(), above)
             continue
         if plain.split()[0].upper() == "ENDDATA":
             break
-        name, fields = _fields(plain)
+        name, fields, mark = _fields(plain, f"{path}: line {number}")
         if name[:1] not in ("", "+", "*"):
-            if card:
-                yield card
-            card = Card(name.rstrip("*_").upper(), fields, number)
-        elif card is None:
+            yield from _put_away(card, waiting)
+            card = _with_early(Card(name.rstrip("*_").upper(), fields, number, mark), early)
+            continue
+        own = _mark(name)
+        if own and card and card.mark not in ("", own) and own not in waiting:
+            early[own] = Card(name, fields, number, mark)
+            continue
+        if own in waiting and not (card and card.mark == own):
+            yield from _put_away(card, waiting)
+            card = waiting.pop(own)
+        if card is None:
             raise InputError(f"{path}: line {number} goes on with a card, but there is none above it")
-        else:
-            card.fields += fields
-    if card:
+        card.fields += fields
+        card.mark = mark
+        card = _with_early(card, early)
+    yield from _put_away(card, waiting)
+    yield from waiting.values()
+    for left in early.values():
+        raise InputError(
+            f"{path}: line {left.line} goes on with a card that ends with the mark {left.name}, but none does"
+        )
+
+
+def _with_early(card: Card, early: dict[str, Card]) -> Card:
+    """The card with all that goes on with it and was read before it."""
+    while card.mark in early:
+        more = early.pop(card.mark)
+        card.fields += more.fields
+        card.mark = more.mark
+    return card
+
+
+def _put_away(card: Card | None, waiting: dict[str, Card]) -> Iterator[Card]:
+    """A card that is complete; one that ends with a mark waits for what goes on with it."""
+    if card and card.mark:
+        earlier = waiting.pop(card.mark, None)
+        if earlier:
+            yield earlier
+        waiting[card.mark] = card
+    elif card:
         yield card
+
+
+def _mark(text: str) -> str:
+    """What the mark of a continuation says."""
+    return text.strip("+* ").upper()
 
 
 def _included(path: Path, name: str, above: tuple[Path, ...]) -> Iterator[Card]:
@@ -100,15 +145,25 @@ def _included(path: Path, name: str, above: tuple[Path, ...]) -> Iterator[Card]:
     yield from cards(inner, (*above, path.resolve()))
 
 
-def _fields(line: str) -> tuple[str, list[str]]:
-    """The first field of a line, and its data fields: four or eight of them, however it is written."""
+def _fields(line: str, where: str) -> tuple[str, list[str], str]:
+    """The first field of a line; its data fields, four or eight of them however it is written; and its mark at the end.
+
+    Raises InputError for more fields than a line has, and for a card that repeats the one above.
+    """
+    if line.lstrip().startswith("="):
+        raise InputError(f"{where} repeats the card above it (=), which is not read; write the cards out")
     if "," in line:
-        name, *fields = (field.strip() for field in line.split(","))
+        name, *fields = (text.strip() for text in line.split(","))
         count = 4 if name.endswith("*") or name.startswith("*") else 8
-        return name, _padded(fields[:count], count)
+        if any(fields[count + 1 :]) or (len(fields) > count and fields[count][:1] not in ("", "+", "*")):
+            raise InputError(
+                f"{where} has {len(fields)} fields behind the name; {count} is the most, then go on in the next line"
+            )
+        return name, _padded(fields[:count], count), _mark("".join(fields[count:]))
     name = line[:8].strip()
     width, count = (16, 4) if name.endswith("*") or name.startswith("*") else (8, 8)
-    return name, _padded([line[8 + width * k : 8 + width * (k + 1)].strip() for k in range(count)], count)
+    fields = [line[8 + width * k : 8 + width * (k + 1)].strip() for k in range(count)]
+    return name, fields, _mark(line[72:80])
 
 
 def _padded(fields: list[str], count: int) -> list[str]:

@@ -21,6 +21,7 @@ import numpy as np
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.children import finished
 from ffr_prep.common.errors import ComputationError, InputError
+from ffr_prep.common.reading import read_text
 from ffr_prep.common.registry import choice
 from ffr_prep.mesh import gmsh_process
 from ffr_prep.mesh.cells import node_order
@@ -32,7 +33,7 @@ from ffr_prep.mesh.time_limit import limit
 CAD_UNITS = {"m": "M", "cm": "CM", "mm": "MM", "in": "INCH"}
 
 _MESHES = (".msh", ".med", ".unv")
-_IGES = (".iges", ".igs")
+_IGES, _STEP = (".iges", ".igs"), "a STEP file"
 _SCRIPT = ".geo"
 _IGES_LINE = rb"[^\n]{72}[SC]"
 _SIGNATURES = {  # how files of data begin
@@ -274,7 +275,7 @@ def _drawn_faces(path: Path, stored: Mapping[str, Array], names: Mapping[str, An
     ]
     if path.suffix.lower() not in (".step", ".stp"):
         return tuple(faces)
-    labels = face_labels(path.read_text(errors="replace"), [face.kind for face in faces])
+    labels = face_labels(read_text(path, _STEP), [face.kind for face in faces])
     return tuple(replace(f, label=f.label or label) for f, label in zip(faces, labels, strict=True))
 
 
@@ -307,4 +308,4 @@ def declared_unit(path: Path) -> str:
     """
     if path.suffix.lower() in _IGES:
         return "mm"
-    return length_unit(path.read_text(errors="replace"))
+    return length_unit(read_text(path, _STEP))

@@ -18,6 +18,7 @@ import fnmatch
 import json
 import re
 import sys
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +30,7 @@ _HXT, _DELAUNAY = 10, 1
 _FLAT = 1e-9
 _ELEMENTS_PER_TURN = 12
 _FEW_FACES = 100
+_LEAST = 1e-4  # of the extent: the finest elements along curves; at the tip of a cone their size would be none
 _DIGITS = 12
 _TETRAHEDRA_PER_CUBE = 8.5  # regular ones, of an edge like that of the cube
 _MOST_ALONG = 2e4
@@ -94,6 +96,9 @@ def _open(gmsh: Any, job: dict[str, Any]) -> None:
         gmsh.option.setNumber("Mesh.MeshSizeExtendFromBoundary", 0)
     gmsh.option.setNumber("Geometry.OCCImportLabels", 1)  # names and colours
     gmsh.open(job["path"])
+    if job["path"].lower().endswith(_CAD):
+        low, high = np.split(np.array(gmsh.model.getBoundingBox(-1, -1)), 2)
+        gmsh.option.setNumber("Mesh.MeshSizeMin", _LEAST * max(high - low))
     if job["wanted"] == "skin" and 0 < len(gmsh.model.getEntities(2)) <= _FEW_FACES:
         gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", 2 * _ELEMENTS_PER_TURN)
     if not gmsh.model.getEntities():
@@ -417,6 +422,8 @@ def _physical_name(gmsh: Any, dimension: int, tag: int) -> str:
 def _given_name(path: str) -> str:
     """The last part of a CAD label such as "Shapes/rod/bore", unless the exporting program made it up."""
     name = path.rpartition("/")[2].strip()
+    with suppress(UnicodeError):  # programs built on OpenCASCADE write the bytes of UTF-8 as letters
+        name = name.encode("latin-1").decode("utf-8")
     return "" if re.match(r"Open CASCADE STEP translator|COMPOUND$|SOLID$", name) else name
 
 

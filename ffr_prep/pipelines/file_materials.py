@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from ffr_prep.common.errors import InputError
@@ -31,6 +31,10 @@ _STIFFEST, _SOFTEST = (
 )  # Pa; what is softer is more often N/mm^2 beside kg/m^3 than a foam, which --material gives
 _LIGHTEST, _HEAVIEST = 20.0, 3e4  # kg/m^3
 _SYSTEMS: Mapping[str, UnitSystem] = {**UNIT_SYSTEMS, "mm-g-ms": UnitSystem(1e-3, 1e-3, 1e-3)}
+
+
+# What materials of Abaqus have beside elasticity that a linear body has not.
+_BEYOND = ("CREEP", "DAMPING", "PLASTIC", "VISCOELASTIC")
 
 
 @dataclass
@@ -145,6 +149,9 @@ def _of_abaqus(path: Path) -> tuple[dict[str, _Constants], dict[str, str]]:
             current = found.setdefault(parameters.get("NAME", "").upper(), _Constants(parameters.get("NAME", "")))
         elif keyword == "ELASTIC" and rows:
             current.kind, current.elastic = _elastic(current, parameters, rows)
+            current.name += _temperature(current, rows)
+        elif keyword in _BEYOND:
+            current.name += f", without its *{keyword}"
         elif keyword == "DENSITY" and rows:
             current.rho = _numbers(rows[:1])[0]
         elif keyword == "SOLID SECTION":
@@ -173,6 +180,13 @@ def _elastic(
     )
 
 
+def _temperature(material: _Constants, rows: list[list[str]]) -> str:
+    """Words for the temperature to which the constants belong, where the file has them for several."""
+    each, at = (1, 2) if material.kind == "ISOTROPIC" else (2, 1)
+    columns = [*rows[each - 1], *[""] * at]
+    return f" at {columns[at]}, the first of {len(rows) // each} temperatures" if len(rows) > each else ""
+
+
 def _numbers(rows: list[list[str]]) -> list[float]:
     try:
         return [float(re.sub("[dD]", "e", word)) for row in rows for word in row if word]
@@ -185,6 +199,7 @@ def _numbers(rows: list[list[str]]) -> list[float]:
 def _of_nastran(path: Path) -> tuple[dict[str, _Constants], dict[str, str]]:
     found: dict[str, _Constants] = {}
     of_group: dict[str, str] = {}
+    mass = 1.0  # of a unit of density: decks whose densities are weights say so
     for card in cards(path):
         if card.name == "MAT1":
             E, G, nu = (card.real(k, 0.0) for k in (2, 3, 4))
@@ -195,4 +210,6 @@ def _of_nastran(path: Path) -> tuple[dict[str, _Constants], dict[str, str]]:
             of_group[f"PROPERTY_{card.integer(1)}"] = str(card.integer(2))
         elif card.name in ("MAT9", "MAT2", "MAT8"):
             found[str(card.integer(1))] = _Constants(f"{card.name} {card.integer(1)}")
-    return found, of_group
+        elif card.name == "PARAM" and card.text(1).upper() == "WTMASS":
+            mass = card.real(2)
+    return {number: replace(of, rho=of.rho and mass * of.rho) for number, of in found.items()}, of_group

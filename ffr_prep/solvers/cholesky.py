@@ -81,7 +81,7 @@ class Division:
 class Factor:
     """P A P^T = L L^T.
 
-    order   : (n,) the unknown at each place of the elimination
+    matrix  : A in the order of its elimination, of which leaves have their rows
     fronts  : the columns of L
     stages  : the fronts in turn, each stage of runs that are independent of each other: all branches, then fronts of the
               trunk whose fronts below are done
@@ -89,7 +89,7 @@ class Factor:
     rows    : how many rows a solution has, with the copies after the n unknowns
     """
 
-    order: Array
+    matrix: Sorted
     fronts: Fronts
     division: Division
     stages: list[list[Run]]
@@ -118,38 +118,39 @@ def cholesky(A: sp.csr_array, positions: Array, advance: Advance = no_advance, h
     Raises numpy.linalg.LinAlgError when A is not positive definite, InputError when the machine has too little memory.
     """
     analysis = analysed(A, positions, held)
-    order, division, factor = analysis.matrix.order, analysis.division, 8 * int(analysis.fronts.offsets[-1])
-    check_memory(factor + waiting(analysis), f"factorising the stiffness of {len(order)} unknowns", LESS)
+    matrix, division, factor = analysis.matrix, analysis.division, 8 * int(analysis.fronts.offsets[-1])
+    check_memory(factor + waiting(analysis), f"factorising the stiffness of {len(matrix.order)} unknowns", LESS)
     advance(0.0, f"the factor takes {in_words(factor)}")
     fronts = analysis.fronts._replace(panels=np.empty(analysis.fronts.offsets[-1]))
     with threads() as each:
-        _eliminate_all(fronts, division, analysis.matrix, each, progress_of(analysis, advance))
-    return Factor(order, fronts, division, *_stages(fronts, division))
+        _eliminate_all(fronts, division, matrix, each, progress_of(analysis, advance))
+    return Factor(matrix, fronts, division, *_stages(fronts, division))
 
 
 def solve_cholesky(factor: Factor, b: Array) -> Array:
     """A^-1 b for b (n, r)."""
-    n = len(factor.order)
+    order = factor.matrix.order
+    n = len(order)
     y = np.empty((factor.rows, b.shape[1]))
-    np.take(b, factor.order, axis=0, out=y[:n], mode="clip")  # which needs no copy
+    np.take(b, order, axis=0, out=y[:n], mode="clip")  # which needs no copy
     y[n:] = 0.0
     _swept(factor, y)
     x = np.zeros(b.shape)
-    x[factor.order] = y[:n]
+    x[order] = y[:n]
     return x
 
 
 def _swept(factor: Factor, y: Array) -> None:
     """(L L^T)^-1 of the rows y of a solution, in place."""
-    fronts, targets = factor.fronts, factor.targets
+    fronts, targets, matrix = factor.fronts, factor.targets, factor.matrix
 
     def back(run: Run) -> None:
         y[run.at : run.at + len(run.copied)] = y[run.copied]
-        backward(fronts, targets, run.first, run.last, y)
+        backward(fronts, targets, matrix, run.first, run.last, y)
 
     with threads() as each:
         for stage in factor.stages:
-            finish(each(lambda run: forward(fronts, targets, run.first, run.last, y), stage))
+            finish(each(lambda run: forward(fronts, targets, matrix, run.first, run.last, y), stage))
             for run in stage:
                 y[run.copied] += y[run.at : run.at + len(run.copied)]
         for stage in reversed(factor.stages):
@@ -178,7 +179,7 @@ def analysed(A: sp.csr_array, positions: Array, held: Array = NOTHING) -> Analys
     starts, children = np.cumsum([0, *map(len, pieces)]), np.array([len(of) for of in below])
     ends, boundary = boundaries(starts, children, matrix)
     own, rest = np.diff(starts), np.diff(ends)
-    offsets = np.concatenate([[0], np.cumsum(kept(own, rest))])
+    offsets = np.concatenate([[0], np.cumsum(kept(own, own + rest * (children > 0)))])
     fronts = Fronts(starts, ends, boundary, offsets, np.zeros(0), children)
     return Analysis(matrix, fronts, _division(fronts, below))
 
@@ -213,7 +214,7 @@ def _stages(fronts: Fronts, division: Division) -> tuple[list[list[Run]], Array,
         stage_of[k] = 1 + max(stage_of[child] for child in division.below[k])
     first = {int(last): int(first) for first, last in division.branches}
     stages: list[list[Run]] = [[] for _ in range(1 + max(stage_of.values()))]
-    targets, rows = fronts.boundary.astype(np.int64), int(fronts.starts[-1])
+    targets, rows = fronts.boundary.copy(), int(fronts.starts[-1])
     for last, stage in sorted(stage_of.items()):
         run = Run(first.get(last, last), last, fronts.boundary[fronts.ends[last] : fronts.ends[last + 1]], rows)
         of_run = targets[fronts.ends[run.first] : fronts.ends[last + 1]]

@@ -40,8 +40,9 @@ Factorisation = Callable[[sp.csr_array, Array, Array, Advance], Solve]
 
 _SINGULAR = 1e13
 _SCALING_SWEEPS = 10
-_BLOCK = 8
-_VECTORS = 3  # that a search has for each mode, about
+_BLOCK = 4  # vectors of a block in a search: the fewer, the fewer are needed in all
+_WIDE, _MANY = 8, 100  # and of one for more modes than these, where passes over all vectors take most of the time
+_VECTORS, _BLOCKS = 3, 12  # that a search has for each mode, about, and beside these
 _REMEDY = "look for parts joined by a single node or edge, or materials of extremely different stiffness"
 
 
@@ -222,11 +223,12 @@ def _flexibility(held: SupportedBody) -> Solve:
 
 
 def _by_lanczos(advance: Advance, held: SupportedBody, M: sp.csr_array, count: int) -> tuple[Array, Array]:
-    space = 8 * M.shape[0] * _VECTORS * (count + 2 * _BLOCK)
+    block = _BLOCK if count <= _MANY else _WIDE
+    space = 8 * M.shape[0] * (_VECTORS * count + _BLOCKS * block)
     check_memory(
         space, f"the search for {count} normal modes of {M.shape[0]} unknowns", f"ask for fewer modes; or {LESS}"
     )
-    start = np.random.default_rng(0).standard_normal((M.shape[0], _BLOCK))
+    start = np.random.default_rng(0).standard_normal((M.shape[0], block))
     return lowest_modes(_flexibility(held), M, start, count, most=20 * count + 300, advance=advance)
 
 

@@ -178,14 +178,23 @@ def _take_out(vectors: Array, Q: SearchSpace, coordinates: Array, each: Map, fir
 
 
 def _combined(Q: SearchSpace, coordinates: Array) -> Array:
-    """(Z, b) Q coordinates (p, b)."""
-    whole = np.zeros((Q.panels[0].shape[1], coordinates.shape[1]))
+    """(Z, b) Q coordinates (p, b), in the memory of Q, whose vectors are gone then."""
+    count = coordinates.shape[1]
 
     def of_rows(part: slice) -> None:
+        whole = np.zeros((part.stop - part.start, count))
         for numbers, rows in Q.used():
-            whole[part] += rows[:, part].T @ coordinates[numbers]
+            whole += rows[:, part].T @ coordinates[numbers]
+        for first, panel in zip(range(0, count, _PANEL), Q.panels, strict=False):
+            some = whole[:, first : first + _PANEL].T
+            panel[: len(some), part] = some
 
     with threads() as each:
-        for _ in each(of_rows, pieces(len(whole))):
+        for _ in each(of_rows, pieces(Q.panels[0].shape[1])):
             pass
-    return whole
+    del Q.panels[-(-count // _PANEL) :]
+    Q.size = count
+    vectors = np.empty((Q.panels[0].shape[1], count))
+    for numbers, rows in Q.used():
+        vectors[:, numbers] = rows.T
+    return vectors

@@ -6,9 +6,11 @@ update of the boundary by the boundary, of which only the lower triangle counts.
 contiguous, as BLAS and LAPACK want it.
 
 What waits is kept without zeros: panels in strips of columns, each from its first column's diagonal on, updates as their
-lower triangle, column after column.
+lower triangle, column after column. Of a leaf, a front with no other below it, the own block alone is kept: with A_21 the
+rows of the matrix at the boundary, its rows of the factor are L_21 = A_21 L_11^-T, and A_21 is sparse.
 
-Source: J. W. H. Liu, SIAM Review 34 (1992) 82-109 (the multifrontal method).
+Sources: J. W. H. Liu, SIAM Review 34 (1992) 82-109 (the multifrontal method); A. George, J. W. H. Liu, Computer Solution of
+Large Sparse Positive Definite Systems (1981), section 6.2 (factors of which a part is kept as the matrix).
 """
 
 from __future__ import annotations
@@ -189,21 +191,26 @@ def shape(fronts, k):  # type: ignore[no-untyped-def]
     return fronts.starts[k + 1] - fronts.starts[k], fronts.ends[k + 1] - fronts.ends[k]
 
 
-def kept(own: Array, rest: Array) -> Array:
-    """How many numbers the strips of panels (own, own + rest) have."""
+def kept(own: Array, rows: Array) -> Array:
+    """How many numbers the strips of panels (own, rows) have."""
     whole, last = own // STRIP, own % STRIP
-    of_whole = STRIP * (whole * (own + rest) - STRIP * (whole * (whole - 1) // 2))
-    return of_whole + last * (own + rest - STRIP * whole)
+    return STRIP * (whole * rows - STRIP * (whole * (whole - 1) // 2)) + last * (rows - STRIP * whole)
+
+
+@numba.njit(cache=True, nogil=True)
+def tall(fronts, k):  # type: ignore[no-untyped-def]
+    """How many rows of the panel of a front are kept: the own ones of a leaf, all of the others."""
+    own, rest = shape(fronts, k)
+    return own + rest if fronts.children[k] else own
 
 
 @numba.njit(cache=True, nogil=True)
 def keep(fronts, k, panel):  # type: ignore[no-untyped-def]
     """The panel (own, own + rest) of a front that is eliminated, as strips into the factor."""
-    own, size = panel.shape
-    at = fronts.offsets[k]
-    for c in range(own):
+    size, at = tall(fronts, k), fronts.offsets[k]
+    for c in range(panel.shape[0]):
         first = c - c % STRIP
-        fronts.panels[at : at + size - first] = panel[c, first:]
+        fronts.panels[at : at + size - first] = panel[c, first:size]
         at += size - first
 
 
@@ -374,20 +381,64 @@ def update_tile(panel, own, update, first, last, top, bottom):  # type: ignore[n
 
 
 @numba.njit(cache=True, nogil=True)
-def forward(fronts, targets, first, last, y):  # type: ignore[no-untyped-def]
+def forward(fronts, targets, A, first, last, y):  # type: ignore[no-untyped-def]
     """L^-1 for the fronts first...last; y (rows, r), `targets` the rows of the boundaries."""
-    space = np.empty(y.shape[1] * tallest(fronts, first, last))
+    space, at = np.empty(y.shape[1] * tallest(fronts, first, last)), np.empty(A.place.size, np.int64)
     for k in range(first, last + 1):
-        own, rest = shape(fronts, k)
-        x = space[: y.shape[1] * (own + rest)].reshape((y.shape[1], own + rest))
-        x[:, own:] = 0.0
-        x[:, :own] = y[fronts.starts[k] : fronts.starts[k + 1]].T
-        _down(fronts.panels[fronts.offsets[k] : fronts.offsets[k + 1]], own, x)
-        y[fronts.starts[k] : fronts.starts[k + 1]] = x[:, :own].T
+        panel, own, x = _begun(fronts, k, y, space)
         rows = targets[fronts.ends[k] : fronts.ends[k + 1]]
-        for i in range(rest):
+        x[:, own:] = 0.0
+        _down(panel, own, x)
+        y[fronts.starts[k] : fronts.starts[k + 1]] = x[:, :own].T
+        if fronts.children[k] == 0:
+            _up(panel, own, x)
+            _take_from_boundary(fronts, k, A, rows, at, x, y)
+            continue
+        for i in range(rows.size):
             for c in range(y.shape[1]):
                 y[rows[i], c] += x[c, own + i]
+
+
+@numba.njit(cache=True, nogil=True)
+def _begun(fronts, k, y, space):  # type: ignore[no-untyped-def]
+    """The strips of a front, how many unknowns are its own, and a solution x (r, rows kept) with these in it."""
+    own, size = shape(fronts, k)[0], tall(fronts, k)
+    x = space[: y.shape[1] * size].reshape((y.shape[1], size))
+    x[:, :own] = y[fronts.starts[k] : fronts.starts[k + 1]].T
+    return fronts.panels[fronts.offsets[k] : fronts.offsets[k + 1]], own, x
+
+
+@numba.njit(cache=True, nogil=True)
+def _take_from_boundary(fronts, k, A, rows, at, x, y):  # type: ignore[no-untyped-def]
+    """A_21 x of a leaf, x (r, own), taken from the rows y of its boundary; at (n,) : for work."""
+    start, stop = fronts.starts[k], fronts.starts[k + 1]
+    at[fronts.boundary[fronts.ends[k] : fronts.ends[k + 1]]] = rows
+    own = x.T.copy()
+    for i in range(stop - start):
+        row = A.order[start + i]
+        for e in range(A.indptr[row], A.indptr[row + 1]):
+            place = A.place[A.indices[e]]
+            if place >= stop:
+                target, value = at[place], A.data[e]
+                for c in range(y.shape[1]):
+                    y[target, c] -= value * own[i, c]
+
+
+@numba.njit(cache=True, nogil=True)
+def _boundary_on_own(fronts, k, A, rows, at, y):  # type: ignore[no-untyped-def]
+    """(own, r) A_21^T y of a leaf, y at the rows of its boundary; at (n,) : for work."""
+    start, stop = fronts.starts[k], fronts.starts[k + 1]
+    at[fronts.boundary[fronts.ends[k] : fronts.ends[k + 1]]] = rows
+    own = np.zeros((stop - start, y.shape[1]))
+    for i in range(stop - start):
+        row = A.order[start + i]
+        for e in range(A.indptr[row], A.indptr[row + 1]):
+            place = A.place[A.indices[e]]
+            if place >= stop:
+                target, value = at[place], A.data[e]
+                for c in range(y.shape[1]):
+                    own[i, c] += value * y[target, c]
+    return own
 
 
 @numba.njit(cache=True, nogil=True)
@@ -405,18 +456,21 @@ def _down(panel, own, x):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True)
-def backward(fronts, targets, first, last, y):  # type: ignore[no-untyped-def]
+def backward(fronts, targets, A, first, last, y):  # type: ignore[no-untyped-def]
     """L^-T for the fronts first...last, the last first."""
-    space = np.empty(y.shape[1] * tallest(fronts, first, last))
+    space, at = np.empty(y.shape[1] * tallest(fronts, first, last)), np.empty(A.place.size, np.int64)
     for k in range(last, first - 1, -1):
-        own, rest = shape(fronts, k)
-        x = space[: y.shape[1] * (own + rest)].reshape((y.shape[1], own + rest))
-        x[:, :own] = y[fronts.starts[k] : fronts.starts[k + 1]].T
+        panel, own, x = _begun(fronts, k, y, space)
         rows = targets[fronts.ends[k] : fronts.ends[k + 1]]
-        for i in range(rest):
-            for c in range(y.shape[1]):
-                x[c, own + i] = y[rows[i], c]
-        _up(fronts.panels[fronts.offsets[k] : fronts.offsets[k + 1]], own, x)
+        if fronts.children[k] == 0:
+            x[:] = _boundary_on_own(fronts, k, A, rows, at, y).T
+            _down(panel, own, x)
+            x[:] = y[fronts.starts[k] : fronts.starts[k + 1]].T - x
+        else:
+            for i in range(rows.size):
+                for c in range(y.shape[1]):
+                    x[c, own + i] = y[rows[i], c]
+        _up(panel, own, x)
         y[fronts.starts[k] : fronts.starts[k + 1]] = x[:, :own].T
 
 
@@ -436,9 +490,8 @@ def _up(panel, own, x):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True)
 def tallest(fronts, first, last):  # type: ignore[no-untyped-def]
-    """Most unknowns of one of the fronts first...last."""
+    """Most rows that are kept of one of the fronts first...last."""
     most = 0
     for k in range(first, last + 1):
-        own, rest = shape(fronts, k)
-        most = max(most, own + rest)
+        most = max(most, tall(fronts, k))
     return most

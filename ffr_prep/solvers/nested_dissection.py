@@ -22,7 +22,7 @@ check_compiled_code()
 Tree = tuple[list[Array], list[list[int]]]
 
 NOTHING = np.zeros(0, int)
-_LEAF = 16
+_LEAF = 48  # of larger leaves the factor is larger, of smaller ones too: more fronts are no leaves
 _LEAST = 0.2  # of a part on either side of a cut
 
 

@@ -75,7 +75,7 @@ def sparse_product(A: sp.csr_array, X: Array, each: Map, out: Array | None = Non
     X = np.ascontiguousarray(X)
     out = np.empty((A.shape[0], X.shape[1])) if out is None else out
 
-    multiply = _multiply_eight if X.shape[1] == 8 else _multiply
+    multiply = _multiply if X.shape[1] % 4 else _multiply_by_four
 
     def rows(part: slice) -> None:
         multiply(A.indptr, A.indices, A.data, X, out, part.start, part.stop)
@@ -101,19 +101,15 @@ def _multiply(indptr, indices, data, X, out, first, last):  # type: ignore[no-un
 
 
 @numba.njit(cache=True, nogil=True)
-def _multiply_eight(indptr, indices, data, X, out, first, last):  # type: ignore[no-untyped-def]
-    """As `_multiply`, of eight columns, which stay in registers."""
+def _multiply_by_four(indptr, indices, data, X, out, first, last):  # type: ignore[no-untyped-def]
+    """As `_multiply`, four columns at a time, which stay in registers."""
     for i in range(first, last):
-        a = b = c = d = e = f = g = h = 0.0
-        for k in range(indptr[i], indptr[i + 1]):
-            value, row = data[k], indices[k]
-            a += value * X[row, 0]
-            b += value * X[row, 1]
-            c += value * X[row, 2]
-            d += value * X[row, 3]
-            e += value * X[row, 4]
-            f += value * X[row, 5]
-            g += value * X[row, 6]
-            h += value * X[row, 7]
-        out[i, 0], out[i, 1], out[i, 2], out[i, 3] = a, b, c, d
-        out[i, 4], out[i, 5], out[i, 6], out[i, 7] = e, f, g, h
+        for j in range(0, X.shape[1], 4):
+            a = b = c = d = 0.0
+            for k in range(indptr[i], indptr[i + 1]):
+                value, row = data[k], indices[k]
+                a += value * X[row, j]
+                b += value * X[row, j + 1]
+                c += value * X[row, j + 2]
+                d += value * X[row, j + 3]
+            out[i, j], out[i, j + 1], out[i, j + 2], out[i, j + 3] = a, b, c, d

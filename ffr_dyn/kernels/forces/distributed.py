@@ -6,7 +6,7 @@ Twin: `ffr_dyn.scene.forces.distributed`.
 from ffr_dyn.kernels.options import kernel
 from ffr_dyn.kernels.simd.force_kernel import force_kernel
 from ffr_dyn.kernels.simd.slices import part, vector_at
-from ffr_dyn.kernels.tables import END_I, FUNCTION, GLOBAL, IN_V, IN_X, LAW, OK, WAY, N, Tables, Vector
+from ffr_dyn.kernels.tables import END_I, FUNCTION, GLOBAL, IN_V, IN_X, LAW, MEASURED, OK, WAY, N, Tables, Vector
 
 
 @kernel
@@ -55,6 +55,7 @@ def distributed(r: Tables, k: int, x: Vector, f: Vector) -> int:
     n, i, j = where[b, N], where[b, IN_X], where[b, IN_V]
     q, own = part(vector_at(x, r.x.size), i + 7, n), part(vector_at(f, r.v.size), j, 6 + n)
     factor = r.work.functions[loads.row[k, FUNCTION], 0]
+    r.work.loads.measured[loads.row[k, MEASURED]] = factor
     if loads.row[k, WAY] == GLOBAL:
         add_global(loads.data, start, factor, r.work.bodies.A[b], q, n, own)
     else:

@@ -22,7 +22,7 @@ from numba import cfunc, types
 from numba.extending import lower_builtin, type_callable
 
 from ffr_dyn.kernels.options import OPTIONS
-from ffr_dyn.kernels.simd.table_address import Packed, pack, place_of
+from ffr_dyn.kernels.simd.table_address import Packed, address_of, pack, place_of
 from ffr_dyn.kernels.tables import Model, Record, Tables, Vector
 
 # By an argument's annotation: its type in compiled code and in C. A vector is the address of its first number.
@@ -105,7 +105,7 @@ class EntryPoint:
     def __call__(self, tables: Tables, *arguments: Any) -> int:
         """One evaluation from Python: the form of the scene. Vectors are contiguous arrays of float64."""
         packed = [pack(each) if isinstance(each, tuple) else each for each in arguments]  # which live until it returns
-        given = [each.ctypes.data if isinstance(each, np.ndarray) else each for each in packed]
+        given = [address_of(each) if isinstance(each, np.ndarray) else each for each in packed]
         return self.chosen(tables.model).short_call(tables.address, *given)
 
 

@@ -7,11 +7,11 @@ of that and reads a field where it uses it. What a table holds, and in which ord
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import ctypes
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from itertools import accumulate
-from types import MappingProxyType
 from typing import Any, get_type_hints
 
 import numpy as np
@@ -58,19 +58,21 @@ class _Plan:
 
 
 @cache
-def _plan(kind: Any) -> _Plan:
+def _plan(kind: Any, but: str = "") -> _Plan:
     places: dict[str, list[int]] = {"array": [], "shape": [], "int": [], "float": []}
-    arrays = _planned(kind, 0, places)
+    arrays = _planned(kind, 0, places, but)
     array, shape, integer, number = (np.array(found, dtype=np.int64) for found in places.values())
     dtypes, axes = [np.dtype(dtype) for dtype, _ in arrays], [axes for _, axes in arrays]
     return _Plan(_words(kind), array, shape, integer, number, dtypes, axes)
 
 
-def _planned(kind: Any, at: int, places: dict[str, list[int]]) -> list[tuple[str, int]]:
-    """The arrays of a table whose first word is number `at`."""
+def _planned(kind: Any, at: int, places: dict[str, list[int]], but: str = "") -> list[tuple[str, int]]:
+    """The arrays of a table whose first word is number `at`, those of one field left out."""
     found: list[tuple[str, int]] = []
-    for of in _fields(kind).values():
-        if of is float or of is int:
+    for name, of in _fields(kind).items():
+        if name == but:
+            pass
+        elif of is float or of is int:
             places[of.__name__].append(at)
         elif _is_table(of):
             found += _planned(of, at, places)
@@ -80,6 +82,11 @@ def _planned(kind: Any, at: int, places: dict[str, list[int]]) -> list[tuple[str
             places["shape"] += range(at + 1, at + _words(of))
         at += _words(of)
     return found
+
+
+def places_of_addresses(kind: Any, but: str = "") -> Array:
+    """Which words of a packed table are addresses, one of its fields left out."""
+    return _plan(kind, but).addresses
 
 
 def _gather(tables: Any, arrays: list[Array], integers: list[int], numbers: list[float]) -> None:
@@ -94,20 +101,29 @@ def _gather(tables: Any, arrays: list[Array], integers: list[int], numbers: list
             integers.append(value)
 
 
-def pack(tables: Any, known: Mapping[int, int] = MappingProxyType({})) -> Array:
+def address_of(array: Array) -> int:
+    """Address of the first number. `array.ctypes` takes ten times as long, and serves where that does not exist."""
+    try:
+        return ctypes.addressof(ctypes.c_char.from_buffer(array))  # type: ignore[arg-type]
+    except (TypeError, ValueError):
+        return array.ctypes.data
+
+
+def pack(tables: Any, addresses: Sequence[int] = (), but: str = "") -> Array:
     """Addresses and shapes of the arrays of nested named tuples, and their numbers (int64). The arrays must outlive it.
 
-    known : addresses by the identity of arrays; numpy takes longer to tell them
+    addresses : of all arrays, where they are known
+    but       : a field that is an empty tuple, of which the words are left open
     """
     kind: Any = type(tables)
-    plan, arrays, integers, numbers = _plan(kind), list[Array](), list[int](), list[float]()
+    plan, arrays, integers, numbers = _plan(kind, but), list[Array](), list[int](), list[float]()
     _gather(tables, arrays, integers, numbers)
     if [of.dtype for of in arrays] != plan.dtypes or [of.ndim for of in arrays] != plan.axes:
-        raise TypeError(f"{type(tables).__name__} holds an array of another type, or of other axes, than it declares")
+        raise TypeError(f"{kind.__name__} holds an array of another type, or of other axes, than it declares")
     if not all(of.flags.c_contiguous for of in arrays):
-        raise TypeError(f"{type(tables).__name__} holds an array that is not contiguous")
-    words = np.empty(plan.words, dtype=np.int64)
-    words[plan.addresses] = [known.get(id(of)) or of.ctypes.data for of in arrays]
+        raise TypeError(f"{kind.__name__} holds an array that is not contiguous")
+    words = np.zeros(plan.words, dtype=np.int64)
+    words[plan.addresses] = addresses or [address_of(of) for of in arrays]
     words[plan.shapes] = [size for of in arrays for size in of.shape]
     words[plan.integers], words[plan.numbers] = integers, np.array(numbers, dtype=float).view(np.int64)
     return words

@@ -21,8 +21,7 @@ function draw() {
 
 function look(direction, up) {
   const towards = unit(direction), right = unit(cross(up, towards));
-  camera.axes = [right, cross(towards, right), towards];
-  camera.target = about.centre.slice();
+  Object.assign(camera, { axes: [right, cross(towards, right), towards], target: about.centre.slice() });
   const stage = $("stage"), reach = (axis) => 0.5 * dot(axis.map(Math.abs), about.extent) / 0.84;
   camera.reach = Math.max(reach(camera.axes[1]), reach(right) * stage.clientHeight / Math.max(stage.clientWidth, 1)) || 1;
   redraw();
@@ -30,10 +29,9 @@ function look(direction, up) {
 
 function turn(dx, dy) {
   const [right, up, towards] = camera.axes;
-  const mix = (a, b, angle) => add(a.map((c) => c * Math.cos(angle)), b, Math.sin(angle));
-  const by = (a, b, angle) => [mix(a, b, angle), mix(b, a, -angle)];
-  const [right2, towards2] = by(right, towards, 0.008 * dx), [up2, towards3] = by(up, towards2, -0.008 * dy);
-  camera.axes = [unit(right2), unit(up2), unit(towards3)];
+  const mix = (a, b, angle) => unit(add(a.map((c) => c * Math.cos(angle)), b, Math.sin(angle)));
+  const [x, y] = [0.008 * dx, -0.008 * dy], near = mix(towards, right, -x);
+  camera.axes = [mix(right, towards, x), mix(up, near, y), mix(near, up, -y)];
   redraw();
 }
 
@@ -41,10 +39,9 @@ function turn(dx, dy) {
 
 const [UP, { direction, up }] = [[0, 0, 1], about.camera];
 const VIEWS = { start: [direction, up], x: [[1, 0, 0], UP], y: [[0, -1, 0], UP], z: [UP, [0, 1, 0]], corner: [[0.75, -1, 0.6], UP] };
-const seek = (time) => { state.time = Math.min(Math.max(time, rows[0]), rows.at(-1)); redraw(); };
+const seek = (time) => { play(false); state.time = Math.min(Math.max(time, rows[0]), rows.at(-1)); redraw(); };
 
 function step(by) {
-  play(false);
   const at = place(state.time), row = at.share >= 1 ? at.next : at.row;
   seek(rows[Math.min(Math.max(row + (by < 0 && at.share > 0 && at.share < 1 ? 0 : by), 0), rows.length - 1)]);
 }
@@ -95,8 +92,7 @@ function list(title, things, open) {
     const label = first.cloneNode(true), [box, swatch, name] = label.children;
     Object.assign(box, { checked: thing.shown, onchange: () => { thing.shown = box.checked; redraw(); } });
     box.dataset.name = thing.name;
-    swatch.hidden = !thing.colour;
-    swatch.style.background = thing.colour;
+    Object.assign(swatch, { hidden: !thing.colour, style: `background: ${thing.colour}` });
     label.title = name.textContent = thing.label || thing.name;
     whole.append(label);
     return box;
@@ -120,11 +116,10 @@ function connect() {
   about.colours.forEach((colour, k) => $("colour").add(new Option(colour.words, k)));
   [$("time").min, $("time").max] = [rows[0], rows.at(-1)];
   $("play").onclick = () => play(!state.playing);
-  $("back").onclick = () => step(-1);
-  $("forward").onclick = () => step(1);
+  for (const [id, by] of [["back", -1], ["forward", 1]]) $(id).onclick = () => step(by);
   $("loop").onclick = () => { state.loop = !state.loop; $("loop").ariaPressed = String(state.loop); };
   $("speed").onchange = () => { state.speed = Number($("speed").value); };
-  $("time").oninput = () => { play(false); seek(Number($("time").value)); };
+  $("time").oninput = () => seek(Number($("time").value));
   $("scale").onchange = () => setScale(Number($("scale").value));
   $("scaling").oninput = () => { const s = Number($("scaling").value); setScale(s > 0 ? 0.1 * (about.most / 0.1) ** (s / 100) : 0); };
   $("colour").onchange = () => setColouring(Number($("colour").value));
@@ -136,7 +131,7 @@ function connect() {
   for (const id of ["edges", "ghost", "names", "frames"]) { $(id).checked = about.boxes.includes(id); $(id).onchange = redraw; }
   for (const button of $("views").querySelectorAll("button")) button.onclick = () => look(...VIEWS[button.dataset.view]);
   $("plots").onpointerdown = $("plots").onpointermove = (event) => {
-    if (event.buttons) { play(false); seek(rows[0] + span() * (event.offsetX - LEFT) / ($("plots").clientWidth - LEFT - 12)); }
+    if (event.buttons) seek(rows[0] + span() * (event.offsetX - LEFT) / ($("plots").clientWidth - LEFT - 12));
   };
   if (rows.length < 2) document.querySelector("footer").style.display = "none";
   mouse();
@@ -167,8 +162,7 @@ async function start() {
   if (!gl) throw new Error("this browser draws no WebGL 2");
   await unpack();
   load();
-  state.time = rows[0];
-  state.limits = about.colours.map((colour) => colour.high);
+  Object.assign(state, { time: rows[0], limits: about.colours.map((colour) => colour.high) });
   connect();
   lists();
   setScale(about.scale);
@@ -179,7 +173,4 @@ async function start() {
   document.body.dataset.ready = "yes";
 }
 
-const ready = start().catch((error) => {
-  $("stage").textContent = `This film cannot be shown: ${error.message}.`;
-  throw error;
-});
+const ready = start().catch((error) => { $("stage").textContent = `This film cannot be shown: ${error.message}.`; throw error; });

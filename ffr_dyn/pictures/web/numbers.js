@@ -16,8 +16,7 @@ let numbers, rows; // ArrayBuffer of all arrays; times of the rows [s]
 
 async function unpack() {
   const packed = Uint8Array.from(atob($("numbers").textContent), (letter) => letter.charCodeAt(0));
-  const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate"));
-  numbers = await new Response(stream).arrayBuffer();
+  numbers = await new Response(new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate"))).arrayBuffer();
 }
 
 /** The array that a reference [type, offset, length] stands for; h2: a history in whole numbers of a scale, the fourth. */

@@ -62,6 +62,17 @@ function drawJoint(joint, at, named) {
   if (named) label(joint.label, [x + 8, y - 8], "#8B1A8B");
 }
 
+/** Places and vectors of a load, the strongest first, and whether its arrow ends there; one on a surface moves with its body. */
+function exerted(load, at) {
+  if (!load.pose) return [[between(load.at, 3, at), between(load.vector, 3, at), false]];
+  const { R, A } = pose(load, at), moved = between(load.moved, load.at.length, at), [factor] = between(load.factor, 1, at);
+  const turned = (v) => [0, 1, 2].map((r) => A[r] * v[0] + A[3 + r] * v[1] + A[6 + r] * v[2]);
+  return Array.from(load.inward, (side, k) => {
+    const [u, d, f] = [load.at, moved, load.vector].map((of) => of.slice(3 * k, 3 * k + 3));
+    return [add(R, turned(add(u, d, state.scale))), (load.turns ? turned(f) : [...f]).map((c) => factor * c), side * factor > 0];
+  });
+}
+
 function drawOver(at, width, height) {
   const half = 0.5 * height / camera.reach, [right, up] = camera.axes, named = $("names").checked;
   const seen = (axis, point) => half * (dot(axis, point) - dot(axis, camera.target));
@@ -87,11 +98,13 @@ function drawOver(at, width, height) {
   }
   const loads = about.arrows.filter((one) => one.shown);
   for (const load of loads) {
-    const from = between(load.at, 3, at), vector = between(load.vector, 3, at), force = load.unit === "N";
-    const largest = Math.max(...loads.filter((one) => one.unit === load.unit).map((one) => one.largest)) || 1;
-    const to = add(from, vector, 0.25 * about.size / largest), colour = force ? "#D55E00" : "#0072B2";
-    arrow(from, to, colour, force ? 1 : 2);
-    if (named) label(`${load.name} ${short(Math.hypot(...vector))} ${load.unit}`, pixels(to).map((c) => c + 5), colour);
+    const alike = load.pose ? [load] : loads.filter((one) => one.unit === load.unit && !one.pose), moment = load.unit === "N m";
+    const length = (load.pose ? 0.12 : 0.25) * about.size / (Math.max(...alike.map((one) => one.largest)) || 1);
+    exerted(load, at).forEach(([place, vector, inward], k) => {
+      const from = inward ? add(place, vector, -length) : place, to = add(from, vector, length), colour = moment ? "#0072B2" : "#D55E00";
+      arrow(from, to, colour, moment ? 2 : 1);
+      if (named && !k) label(`${load.name} ${short(Math.hypot(...vector))} ${load.unit}`, pixels(inward ? from : to).map((c) => c + 5), colour);
+    });
   }
   drawBar(width, height);
 }

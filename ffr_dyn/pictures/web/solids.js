@@ -76,8 +76,7 @@ function loadSurface(surface) {
   surface.corners = buffer(gl.ELEMENT_ARRAY_BUFFER, Uint32Array.from([...array(surface.triangles), ...array(surface.edges)]));
   surface.still = vertices([[points, 3, 0, 0], [moduli, 2, 0, 0]]);
   surface.undeformed = vertices([[points, 3, 0, 0]], surface.corners);
-  surface.shapeTexture = shapesTexture(array(surface.shapes));
-  surface.tensorTexture = shapesTexture(array(surface.tensors));
+  [surface.shapeTexture, surface.tensorTexture] = [surface.shapes, surface.tensors].map((of) => shapesTexture(array(of)));
 }
 
 /** Where a body's points are written to, five numbers each: place, what colours it, and the colour. */
@@ -100,8 +99,8 @@ function load() {
   about.bodies.forEach(loadBody);
   for (const colour of about.colours)
     if (colour.map) colour.texture = texture(gl.RGB8, gl.RGB, gl.UNSIGNED_BYTE, colour.map[2] / 3, 1, array(colour.map), gl.LINEAR);
-  for (const thing of [...about.joints, ...about.markers, ...about.arrows, ...about.traces, ...about.series])
-    for (const key of ["at", "axis", "vector", "points", "values"]) if (thing[key]) thing[key] = array(thing[key]);
+  for (const thing of [about.joints, about.markers, about.arrows, about.traces, about.series].flat())
+    for (const [key, of] of Object.entries(thing)) if (Array.isArray(of)) thing[key] = array(of);
 }
 
 /** The points of a body at a time. */

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Annotated, Any
 
 from ffr_dyn.scene.fields import DAMPING, FORCE, STIFFNESS, In, OfMotion
@@ -48,7 +49,7 @@ class Actuator(Force):
         check_number(self.stiffness, f"{self.place.who}: stiffness", least=0.0)
         check_number(self.damping, f"{self.place.who}: damping", least=0.0)
 
-    @property
+    @cached_property
     def place(self) -> OnJoint:
         return OnJoint(f"force {self.name!r}", self.joint, self.coordinate)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Annotated, Any
 
 import numpy as np
@@ -70,7 +71,7 @@ class Bushing(Force):
         if self.i == self.j:
             raise InputError(f"{who} ties {self.i!r} to itself")
 
-    @property
+    @cached_property
     def place(self) -> BetweenAxes:
         who = f"bushing {self.name!r}"
         on_i = triad(self.axes, f"{who}: axes")

@@ -16,12 +16,15 @@ from typing import Any
 import numpy as np
 
 from ffr_dyn.scene.forces.force import LawNumbers, LoadTable, Moment
+from ffr_dyn.scene.forces.given import is_number
+from ffr_dyn.scene.forces.places import FACTOR, Measured
 from ffr_dyn.scene.scene import Scene
 from ffr_prep.body import FlexibleBody, Surface, axial
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 
 _SAME_PLACE = 1e-9  # of the size of the body
+_MOST_ARROWS = 16  # of a load
 
 
 @dataclass(frozen=True)
@@ -75,6 +78,37 @@ def compiled_integrals(force: Any, table: LoadTable) -> LawNumbers:
     """The numbers that the kernel of distributed loads reads."""
     made: Affine | Spread = force.integrals(force.place.of(table.scene).model)
     return LawNumbers(made.numbers(), table.function(force.function))
+
+
+def measured_factor(force: Any) -> tuple[Measured, ...]:
+    """What a result keeps of the load: its function, where that is no number."""
+    return () if is_number(force.function) else FACTOR
+
+
+def arrows_on_surface(force: Any, unit: str, corners: Array, vectors: Array, inward: Array) -> dict[str, Any]:
+    """What a picture needs of a load on a surface, in JSON values.
+
+    corners : (N, k) numbers of the points in whose middle an arrow stands;  vectors : (N, 3) [unit] for a factor of one
+    inward  : (N,) 1 where the arrow ends there for a positive factor, -1 where it does for a negative one, 0 where it begins
+    factor  : of all, where it is a number; others are kept by a result
+    """
+    strongest = np.argsort(-np.linalg.norm(vectors, axis=1), kind="stable")
+    numbers = {"corners": corners, "vectors": vectors, "inward": inward}
+    told = {"body": force.body, "unit": unit, "axes": force.place.axes, "factor": force.function}
+    if not is_number(force.function):
+        del told["factor"]
+    return {"spread": told | {key: of[strongest].tolist() for key, of in numbers.items()}}
+
+
+def far_apart(places: Array) -> Array:
+    """Numbers of the places (M, 3) at which arrows are drawn: few, each as far as can be from those before it."""
+    distance = np.linalg.norm(places - places.mean(axis=0), axis=1)
+    chosen = [int(np.argmin(distance))]
+    distance = np.linalg.norm(places - places[chosen[0]], axis=1)
+    while len(chosen) < _MOST_ARROWS and distance.max() > 0:
+        chosen.append(int(np.argmax(distance)))
+        distance = np.minimum(distance, np.linalg.norm(places - places[chosen[-1]], axis=1))
+    return np.array(chosen)
 
 
 def affine(u: Array, Phi: Array, f: Array, slope: Array) -> Affine:

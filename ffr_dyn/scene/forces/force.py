@@ -108,6 +108,10 @@ class Force(ABC):
         """InputError when the scene has not what the force needs."""
         self.place.check(scene)
 
+    def drawn(self, scene: Scene) -> dict[str, Any]:
+        """What a picture of it needs beside its markers, in JSON values (`ffr_dyn.scene.forces.places.Place.drawn`)."""
+        return self.place.drawn(scene)
+
     def on_parts(self, whole: FlexibleBody, parts: Mapping[str, FlexibleBody]) -> tuple[Force, ...]:
         """The forces on the parts, by name, in place of a force on the body that they make up."""
         return (self,)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Annotated, Any
 
 import numpy as np
@@ -64,7 +65,7 @@ class JointFriction(Force):
             check_number(self.static, f"{who}: static", least=self.coulomb)
             check_positive(self.stribeck, f"{who}: stribeck")
 
-    @property
+    @cached_property
     def place(self) -> OnJoint:
         return OnJoint(f"force {self.name!r}", self.joint, self.coordinate)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Annotated
 
 from ffr_dyn.functions.curves import Curve
@@ -50,7 +51,7 @@ class JointSpring(Force):
         check_number(self.free, f"{who}: free")
         check_number(self.preload, f"{who}: preload")
 
-    @property
+    @cached_property
     def place(self) -> OnJoint:
         return OnJoint(f"force {self.name!r}", self.joint, self.coordinate, self.turns)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Annotated
 
 import numpy as np
@@ -61,7 +62,7 @@ class JointStop(Force):
         if self.lower is not None and self.upper is not None and not self.lower < self.upper:
             raise InputError(f"{who}: lower is {self.lower:g} and upper {self.upper:g}; lower must be below upper")
 
-    @property
+    @cached_property
     def place(self) -> OnJoint:
         return OnJoint(f"force {self.name!r}", self.joint, self.coordinate, self.turns)
 

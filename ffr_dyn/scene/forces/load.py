@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sized
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Annotated, Any
 
 import numpy as np
@@ -61,7 +62,7 @@ class Load(Force):
                 whole = "a function (t, state) that gives all of them goes to `function`"
                 raise InputError(f"load {self.name!r}: {what} needs three components, not {found}; {whole}")
 
-    @property
+    @cached_property
     def place(self) -> AtMarker:
         acting = (
             self.function is not None or any(not is_number(c) or c for c in of) for of in (self.force, self.moment)

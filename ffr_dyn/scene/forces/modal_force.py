@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Annotated, Any
 
 import numpy as np
@@ -10,7 +11,13 @@ import numpy as np
 from ffr_dyn.scene.fields import In, OfTime, PerMode
 from ffr_dyn.scene.force_kinds import register_force
 from ffr_dyn.scene.forces.checks import check_array, check_function
-from ffr_dyn.scene.forces.distributed import Affine, check_integrals, compiled_integrals, law_of_integrals
+from ffr_dyn.scene.forces.distributed import (
+    Affine,
+    check_integrals,
+    compiled_integrals,
+    law_of_integrals,
+    measured_factor,
+)
 from ffr_dyn.scene.forces.force import Force
 from ffr_dyn.scene.forces.places import OnBody
 from ffr_prep.body import FlexibleBody
@@ -45,9 +52,9 @@ class ModalForce(Force):
         shape = np.shape(self.values)
         object.__setattr__(self, "values", check_array(self.values, shape[:1], f"{who}: values"))
 
-    @property
+    @cached_property
     def place(self) -> OnBody:
-        return OnBody(f"force {self.name!r}", self.body)
+        return OnBody(f"force {self.name!r}", self.body, measured=measured_factor(self))
 
     def integrals(self, body: FlexibleBody) -> Affine:
         """For a factor of one. Raises InputError when the body has another number of modes."""

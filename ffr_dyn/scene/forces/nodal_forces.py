@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Annotated, Any
 
 import numpy as np
@@ -15,15 +16,19 @@ from ffr_dyn.scene.forces.distributed import (
     Affine,
     Spread,
     affine,
+    arrows_on_surface,
     check_integrals,
     compiled_integrals,
+    far_apart,
     indices,
     law_of_integrals,
+    measured_factor,
     numbers_at,
     surface_of,
 )
 from ffr_dyn.scene.forces.force import Force
 from ffr_dyn.scene.forces.places import OnBody
+from ffr_dyn.scene.scene import Scene
 from ffr_prep.body import FlexibleBody, Surface
 from ffr_prep.common.errors import InputError
 
@@ -67,9 +72,19 @@ class NodalForces(Force):
         object.__setattr__(self, "points", points)
         object.__setattr__(self, "forces", forces)
 
-    @property
+    @cached_property
     def place(self) -> OnBody:
-        return OnBody(f"force {self.name!r}", self.body, self.axes)
+        return OnBody(f"force {self.name!r}", self.body, self.axes, measured_factor(self))
+
+    def drawn(self, scene: Scene) -> dict[str, Any]:
+        """Forces at few of the points, each with those of the points that are nearest to it (`arrows_on_surface`)."""
+        surface = surface_of(self.place.of(scene).model, self.name)
+        places = surface.points[self.points]
+        chosen = far_apart(places)
+        nearest = np.linalg.norm(places[:, None] - places[chosen], axis=2).argmin(axis=1)
+        sums = np.zeros((len(chosen), 3))
+        np.add.at(sums, nearest, self.forces)
+        return arrows_on_surface(self, "N", self.points[chosen, None], sums, np.zeros(len(chosen), int))
 
     def on_parts(self, whole: FlexibleBody, parts: Mapping[str, FlexibleBody]) -> tuple[Force, ...]:
         """The forces, each on the first part that has its point.

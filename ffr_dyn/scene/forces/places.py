@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -37,6 +37,7 @@ from ffr_dyn.scene.scene import (
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 
+LEVEL = 5e-10  # m, that points of a plane may be apart along its normal
 COORDINATE, RATE, FORCE = range(3)  # columns recorded of a force on one coordinate
 
 
@@ -56,6 +57,7 @@ FORCE_AND_MOMENT = (
     Measured("force", "N", "force, in the axes of the load", 0, 3),
     Measured("moment", "N m", "moment, in the axes of the load", 3, 3),
 )
+FACTOR = (Measured("factor", "1", "function of time by which the load is multiplied", 0),)
 _ON_LINE = (
     Measured("tension", "N", "spring-damper force, tension positive", FORCE, sign=-1.0),
     Measured("length", "m", "distance of the ends", COORDINATE),
@@ -76,6 +78,13 @@ _ON_JOINT = {
         Measured("stroke", "m", "joint stroke along its axis", COORDINATE),
     ),
 }
+
+
+def effort(joint: Joint, coordinate: str, quantity: str, factor: float = 1.0) -> dict[str, Any]:
+    """What is drawn of a force or torque that increases a joint coordinate: it acts on the body of j (`Place.drawn`)."""
+    along = factor * frames(joint)[0][:, 2]
+    unit = "N m" if coordinate == "angle" else "N"
+    return {"of": quantity, "unit": unit, "at": joint.j, "body": joint.i.partition(".")[0], "along": along.tolist()}
 
 
 class Place(ABC):
@@ -118,6 +127,15 @@ class Place(ABC):
         """The numbers of the place in compiled code, such as axes."""
         return []
 
+    def drawn(self, scene: Scene) -> dict[str, Any]:
+        """What a picture needs beside the markers, in JSON values.
+
+        axes    : "global" or "body", in which a result keeps `force` and `moment`
+        efforts : what acts on a marker `at`: the quantity `of` in `unit`, times the vector `along`, or in the axes `along`
+                  (three vectors), given in axes of `body`
+        """
+        return {}
+
     def stays_in_plane(self, scene: Scene, normal: int) -> bool:
         """Whether what acts there, whatever its size, moves bodies only in the plane across the global axis `normal`."""
         return False
@@ -145,6 +163,9 @@ class AtMarker(Place):
     def markers(self, scene: Scene) -> tuple[str, ...]:
         return (self.marker,)
 
+    def drawn(self, scene: Scene) -> dict[str, Any]:
+        return {"axes": self.axes}
+
     def axis_along(self, scene: Scene, normal: int) -> int:
         """Which of its axes is along the global axis `normal`."""
         b = self.ends(scene)[0]
@@ -170,7 +191,7 @@ class AlongLine(Place):
 
     def stays_in_plane(self, scene: Scene, normal: int) -> bool:
         i, j = (undeformed(scene, number)[normal] for number in self.ends(scene))
-        return bool(round(abs(i - j), 9) == 0)
+        return bool(abs(i - j) <= LEVEL)
 
 
 @dataclass(frozen=True)
@@ -212,6 +233,9 @@ class OnJoint(Place):
     def markers(self, scene: Scene) -> tuple[str, ...]:
         joint = self.of(scene)
         return joint.i, joint.j
+
+    def drawn(self, scene: Scene) -> dict[str, Any]:
+        return {"efforts": [effort(self.of(scene), self.coordinate, self.measured[0].name)]}
 
     def axes(self, scene: Scene) -> Array:
         """(3, 3) f_i, g_i, f_j of an angle, or h_i of a stroke, in body axes."""
@@ -257,6 +281,10 @@ class BetweenAxes(Place):
     def markers(self, scene: Scene) -> tuple[str, ...]:
         return self.i, self.j
 
+    def drawn(self, scene: Scene) -> dict[str, Any]:
+        there = {"at": self.j, "body": self.i.partition(".")[0], "along": self.on_i.T.tolist()}
+        return {"efforts": [{"of": one.name, "unit": one.unit, **there} for one in self.measured[2:]]}
+
     def numbers(self, scene: Scene) -> list[float]:
         return [*self.on_i.T.ravel(), *self.on_j.T.ravel()]
 
@@ -265,14 +293,18 @@ class BetweenAxes(Place):
 class OnBody(Place):
     """A body through its basis, for the force `who`; axes "global" or "body": where directions of forces stay.
 
+    measured : what a result keeps of the number that its kernel records
+
     >>> place = fd.OnBody("wind", "blade")
     """
 
     rank = 2
+    initial = (0.0,)
 
     who: str
     body: str
     axes: str = "body"
+    measured: tuple[Measured, ...] = ()
 
     @property
     def way(self) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Annotated, Any
 
 import numpy as np
@@ -14,15 +15,19 @@ from ffr_dyn.scene.forces.checks import check_array, check_function
 from ffr_dyn.scene.forces.distributed import (
     Affine,
     affine,
+    arrows_on_surface,
     check_integrals,
     compiled_integrals,
+    far_apart,
     indices,
     law_of_integrals,
+    measured_factor,
     numbers_at,
     surface_of,
 )
 from ffr_dyn.scene.forces.force import Force
 from ffr_dyn.scene.forces.places import OnBody
+from ffr_dyn.scene.scene import Scene
 from ffr_prep.body import FlexibleBody, Surface
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
@@ -67,9 +72,21 @@ class Pressure(Force):
         if self.triangles is not None and not (isinstance(self.triangles, str) or callable(self.triangles)):
             object.__setattr__(self, "triangles", indices(self.triangles, f"{who}: triangles"))
 
-    @property
+    @cached_property
     def place(self) -> OnBody:
-        return OnBody(f"force {self.name!r}", self.body)
+        return OnBody(f"force {self.name!r}", self.body, measured=measured_factor(self))
+
+    def drawn(self, scene: Scene) -> dict[str, Any]:
+        """The pressure at few of the triangles (`arrows_on_surface`)."""
+        body = self.place.of(scene).model
+        surface = surface_of(body, self.name)
+        corners = surface.triangles[self._chosen(body, surface)]
+        corners = corners[far_apart(surface.points[corners].mean(axis=1))]
+        a, b, c = np.moveaxis(surface.points[corners], 1, 0)
+        normal = np.cross(b - a, c - a)
+        normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), np.finfo(float).tiny)
+        pressure = self._at_points(body, surface)[corners].mean(axis=1)
+        return arrows_on_surface(self, "Pa", corners, -pressure[:, None] * normal, np.sign(pressure).astype(int))
 
     def on_parts(self, whole: FlexibleBody, parts: Mapping[str, FlexibleBody]) -> tuple[Force, ...]:
         """The same pressure on the triangles of each part that are those of the whole: not on its cuts.

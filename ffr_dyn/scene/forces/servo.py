@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Annotated, Any
 
 import numpy as np
@@ -53,7 +54,7 @@ class Servo(Force):
         if not self.limit > 0:
             raise InputError(f"{who}: limit is {self.limit}; it must be positive")
 
-    @property
+    @cached_property
     def place(self) -> OnJoint:
         return OnJoint(f"force {self.name!r}", self.joint, self.coordinate, self.turns)
 

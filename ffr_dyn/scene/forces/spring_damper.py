@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Annotated
 
 from ffr_dyn.functions.curves import Curve
@@ -57,7 +58,7 @@ class SpringDamper(Force):
         if self.i == self.j:
             raise InputError(f"{who} has length zero: both its ends are at {self.i!r}")
 
-    @property
+    @cached_property
     def place(self) -> AlongLine:
         return AlongLine(self.i, self.j)
 

@@ -18,6 +18,11 @@ _SURFACES = {  # words of STEP and of the CAD library
 }
 _ENTITY = re.compile(r"#(\d+)\s*=\s*([A-Z_]+)\s*\(((?:'[^']*+'|[^';])*+);")  # a quote in a text is two quotes
 _FACE = re.compile(r"\s*'((?:[^']|'')*+)'[^']*,\s*#(\d+)\s*,\s*\.[TF]\.\s*\)\s*")
+# Letters by their numbers in Unicode, by one in Latin-1, or by that of an ASCII letter 128 before; a backslash is two.
+_CODE = re.compile(
+    r"\\X(?P<bytes>[24])\\(?P<wide>(?:[0-9A-F]{4})*?)\\X0\\|\\X\\(?P<one>[0-9A-F]{2})|\\S\\(?P<upper>[ -~])|\\(?P<slash>\\)",
+    re.IGNORECASE,
+)
 _MADE_UP = re.compile(r"(NONE|FACE|ADVANCED_FACE)?\s*\d*", re.IGNORECASE)
 
 
@@ -47,7 +52,21 @@ def face_labels(text: str, kinds: Sequence[str]) -> list[str]:
         word, body = entities.get(face, ("", ""))
         parts = _FACE.fullmatch(body) if word in ("ADVANCED_FACE", "FACE_SURFACE") else None
         surface = entities.get(parts[2], ("", ""))[0] if parts else ""
-        found.append((parts[1].replace("''", "'").strip() if parts else "", _SURFACES.get(surface, "")))
+        found.append((_spelled(parts[1]) if parts else "", _SURFACES.get(surface, "")))
     named = {name for name, _ in found if not _MADE_UP.fullmatch(name)}
     same = len(found) == len(kinds) and all(of in ("", kind) for (_, of), kind in zip(found, kinds, strict=True))
     return [name if name in named else "" for name, _ in found] if same and named else [""] * len(kinds)
+
+
+def _spelled(text: str) -> str:
+    """A text of the file as it is read: letters beyond ASCII may stand in it as such or as codes (ISO 10303-21, 6.4.3)."""
+    return _CODE.sub(_letters, text.replace("''", "'")).strip()
+
+
+def _letters(code: re.Match[str]) -> str:
+    if code["wide"] is not None:
+        wide = "utf-16-be" if code["bytes"] == "2" else "utf-32-be"
+        return bytes.fromhex(code["wide"]).decode(wide, "replace")
+    if code["one"] is not None:
+        return chr(int(code["one"], 16))
+    return chr(ord(code["upper"]) + 128) if code["upper"] else code["slash"]

@@ -19,16 +19,19 @@ from test_turned_stiffening import FIXED
 
 import ffr_dyn as fd
 from ffr_dyn.analyses.checkpoint import fingerprint
+from ffr_dyn.closing import constraints
 from ffr_dyn.closing.constraints import constraints_of, rows_at
 from ffr_dyn.compile import elimination, row_tables, workspace
+from ffr_dyn.compile.engine import new_engine
 from ffr_dyn.consistency import across
 from ffr_dyn.consistency.assemble import assemble, flat_form
 from ffr_dyn.equations.constraint_rows import blocks_of
 from ffr_dyn.equations.constraint_rows import rows_at as readable_rows
 from ffr_dyn.equations.layout import initial_state, moved
 from ffr_dyn.functions.time_functions import polynomial
+from ffr_dyn.kernels.simd.table_address import pack
 from ffr_dyn.scene.scene import Body, Scene
-from ffr_prep.body import FlexibleBody, remembered, rigid_body, save_body
+from ffr_prep.body import FlexibleBody, constructors, remembered, rigid_body, save_body
 
 LINK = rod(FIXED)
 
@@ -74,6 +77,28 @@ def turned_link() -> Scene:
     return Scene((Body("link", LINK),), (hinge,), ground={"O": (0, 0, 0)}, gravity=(0, 0, -9.81))
 
 
+def four_bar(angle: float) -> Scene:
+    """A parallelogram of rigid bars, singular where it is flat (angle 0) and regular elsewhere."""
+    bars = {name: rigid_body(name, mass=1.0, inertia=(0.1,) * 3, centre_of_mass=(0.5 * length, 0, 0),
+                             points={"a": (0, 0, 0), "b": (length, 0, 0)})
+            for name, length in (("left", 1.0), ("top", 2.0), ("right", 1.0))}  # fmt: skip
+    end = np.array([np.cos(angle), np.sin(angle), 0.0])
+    places = {"left": (0, 0, 0), "top": end, "right": (2, 0, 0)}
+    turns = {"left": angle, "top": 0.0, "right": angle}
+    ties = {
+        "one": ("ground.O", "left.a"),
+        "two": ("left.b", "top.a"),
+        "three": ("top.b", "right.b"),
+        "four": ("ground.P", "right.a"),
+    }
+    return Scene(
+        tuple(Body(name, bar, position=places[name], rotation=(0, 0, turns[name])) for name, bar in bars.items()),
+        tuple(fd.Joint(name, "revolute", *ends) for name, ends in ties.items()),
+        ground={"O": (0, 0, 0), "P": (2, 0, 0)},
+        gravity=(0, -9.81, 0),
+    )
+
+
 def softer(link: FlexibleBody) -> FlexibleBody:
     """The link with one number changed."""
     return replace(link, omega2=link.omega2 * np.append(0.9, np.ones(link.n - 1)))
@@ -103,6 +128,8 @@ SCENES = {
                                 slider_crank().joints[3]),
     ),
     "across y": turned_link,
+    "four-bar": lambda: four_bar(0.5),
+    "four-bar, flat": lambda: four_bar(0.0),
 }  # fmt: skip
 
 
@@ -121,7 +148,10 @@ def digest(scene: Scene) -> str:
 def forget() -> None:
     """As in a new process, but for what bodies remember."""
     across._KNOWN.clear()
-    for function in (elimination._eliminated, row_tables._pattern, workspace._rigid_inertia):
+    workspace._BLANK.clear()
+    for function in (
+        elimination._eliminated, row_tables._pattern, workspace._rigid_inertia, constraints._entries, constructors._rigid
+    ):  # fmt: skip
         function.cache_clear()
 
 
@@ -218,9 +248,27 @@ def test_a_body_remembers_what_was_made_of_it_and_no_copy_does():
     for _ in range(3):
         assert remembered(body, "answer", lambda: (made.append(1), 42)[1]) == 42
     assert len(made) == 1
-    for other in (replace(body), pickle.loads(pickle.dumps(body)), copy.deepcopy(body), crank()):
+    for other in (replace(body), pickle.loads(pickle.dumps(body)), copy.deepcopy(body), crank(mass=0.25)):
         assert remembered(other, "answer", lambda: 43) == 43
     assert remembered(body, "another", lambda: 44) == 44
+
+
+def test_equal_rigid_bodies_are_one_and_others_are_not():
+    assert crank() is crank()
+    assert crank(mass=0.3).mass == 0.3
+    assert crank(length=0.2).interface("pin").position.tolist() == [0.2, 0.0, 0.0]
+    below, above = (rigid_body("b", mass=1.0, inertia=(1, 1, 1), points={"p": (0, zero, 0)}) for zero in (-0.0, 0.0))
+    assert np.signbit([below.interface("p").position[1], above.interface("p").position[1]]).tolist() == [True, False]
+
+
+@pytest.mark.parametrize("make", SCENES.values(), ids=SCENES)
+@pytest.mark.parametrize("method", [None, fd.RK4(1e-4), fd.ROS2(1e-4), fd.DormandPrince()], ids=repr)
+def test_memory_that_is_copied_says_where_it_is(make, method):
+    """Copied words of tables are those of the tables: addresses, shapes, numbers."""
+    found = assemble(make())
+    for _ in range(2):
+        engine = new_engine(found.system, found.x, found.v, method)
+        np.testing.assert_array_equal(engine.words, pack(engine.tables))
 
 
 def test_a_body_remembers_no_more_than_it_should():

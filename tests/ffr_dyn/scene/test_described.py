@@ -35,4 +35,5 @@ def test_joints_drivers_and_forces_are_told_by_their_markers():
     assert found["motor"] == {"kind": "driver", "at": ["ground.O", "bar.a"], "axis": None}
     assert found["pull"] == {"kind": "Load", "at": ["bar.b"], "constant": {"force": [1, 0, 0]}, "axes": "body"}
     assert found["wave"] == {"kind": "Load", "at": ["bar.b"], "axes": "global"}
-    assert found["coil"] == {"kind": "JointSpring", "at": ["ground.O", "bar.a"]}
+    effort = {"of": "torque", "unit": "N m", "at": "bar.a", "body": "ground", "along": [0, 0, 1]}
+    assert found["coil"] == {"kind": "JointSpring", "at": ["ground.O", "bar.a"], "efforts": [effort]}

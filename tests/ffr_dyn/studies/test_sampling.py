@@ -50,6 +50,9 @@ def test_samples_have_the_moments_of_their_distributions(sampling):
     (Spread("normal", (1.0,)), "normal takes .mean, deviation., and 1 numbers"),
     (Spread("gauss", (1.0, 2.0)), "no distribution 'gauss'"),
     (Spread("uniform", (1.0, np.nan)), "no finite quantiles"),
+    (Spread("weibull_min", ()), "weibull_min takes .c, loc, scale., and 0 numbers"),
+    (Spread("weibull_min", (1.0, 2.0, 3.0, 4.0)), "weibull_min takes .c, loc, scale., and 4 numbers"),
+    (Spread("expon", (1.0, 2.0, 3.0)), "expon takes .loc, scale., and 3 numbers"),
     (Spread("triangular", (1.0, 2.0, 0.0)), "no finite quantiles|c"),
 ])  # fmt: skip
 def test_distributions_that_are_none_are_refused_by_name(spread, says):

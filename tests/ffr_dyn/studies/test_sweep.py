@@ -17,6 +17,7 @@ import ffr_dyn as fd
 import ffr_prep.cli
 from ffr_dyn.studies.draw import running_mean, tornado
 from ffr_dyn.studies.measures import attribute, measured
+from ffr_dyn.studies.plan import mark
 from ffr_dyn.studies.runs import Row, body_file
 from ffr_dyn.studies.table import Journal, journal_of
 from ffr_prep.common.errors import ComputationError, InputError
@@ -201,7 +202,7 @@ def test_a_killed_command_goes_on(folder):
 
 
 def test_a_run_that_fails_is_a_row_with_its_message(folder):
-    study = fd.study(folder / "bar.toml", {"length": [1.0, 1e400, 2.0]}, {"angle": "hinge.angle: last"})
+    study = fd.study(folder / "bar.toml", {"bodies.bar.mass": [1.0, -1.0, 2.0]}, {"angle": "hinge.angle: last"})
     table = fd.sweep(study, folder / "t.nc", workers=0)
     assert table.failed.tolist() == [1]
     assert "bar" in table.messages[1]
@@ -225,11 +226,78 @@ def test_a_run_that_fails_is_a_row_with_its_message(folder):
     (("angle =", "g ="), "'g' cannot be a column"),
     (("scene =", "scenes ="), "did you mean 'scene'"),
     (('"bar.toml"', '"rab.toml"'), "rab.toml.* does not exist"),
+    (("g = [1", "g = [nan"), r"parameters.g = \[nan, .*finite numbers"),
+    (("g = [1", "g = [true"), r"parameters.g = \[True, .*finite numbers"),
+    (("to = 2.0", "to = inf"), "parameters.length: there are no finite values from 0.5 to inf"),
+    (("scene =", "seed = -1\nscene ="), "seed is -1; give a whole number, 0 or more"),
+    (("scene =", "samples = 10\nscene ="), "samples = 10 changes nothing: no parameter has a distribution"),
+    (("= force / g", "= forc / g"), "outputs.weight: in the formula 'forc / g', 'forc' is not known; did you mean 'force'"),
+    (("= force / g", "= force / hinge.g"), "'hinge.g' is no output and no parameter"),
+    (("= force / g", "= force * t"), "'t' is no output and no parameter"),
+    (("= force / g", "= force /"), "outputs.weight: 'force /' is not a formula"),
+    (("= force / g", "= weight / g"), "the formulas of weight depend on themselves"),
+    (("angle =", "'' ="), "'' cannot be a column"),
+    (("angle =", "'..' ="), "'..' cannot be a column"),
+    (("angle =", '"a\\u0000" ='), "cannot be a column"),
 ])  # fmt: skip
 def test_what_a_study_file_says_wrongly_is_named(folder, changed, says):
     (folder / "study.toml").write_text(STUDY.replace(*changed))
     with pytest.raises(InputError, match=says):
         fd.load_study(folder / "study.toml")
+
+
+@pytest.mark.parametrize(("settings", "says"), [
+    ({"points_are": "lsit"}, "points is 'lsit'; did you mean 'list'"),
+    ({"sampling": "sobl"}, "sampling is 'sobl'; did you mean 'sobol'"),
+    ({"samples": 2.5}, "samples is 2.5; give a whole number"),
+    ({"seed": True}, "seed is True; give a whole number"),
+])  # fmt: skip
+def test_settings_of_a_program_are_looked_at_as_those_of_a_file(folder, settings, says):
+    with pytest.raises(InputError, match=says):
+        fd.study(folder / "bar.toml", {"g": [1.0, 2.0]}, {"angle": "hinge.angle: last"}, **settings)
+
+
+def test_values_may_be_those_of_arrays(folder):
+    outputs = {"angle": "hinge.angle: last", "history": "hinge.angle: history", "twice": "= 2 * angle"}
+    lists = [np.array([1.0, 2.5]), list(np.array([1.0, 2.5])), (1.0, 2.5)]
+    points = [fd.study(folder / "bar.toml", {"g": given}, outputs).points for given in lists]
+    assert points[0] == points[1] == points[2]
+    assert all(type(point["g"]) is float for of in points for point in of)
+
+
+def test_histories_are_not_computed_again(folder):
+    """A study of histories that was stopped goes on where it was, to the same bits."""
+    outputs = {"angle": "hinge.angle: history", "force": "hinge.force: largest"}
+    study = fd.study(folder / "bar.toml", {"g": [1.0, 2.0, 3.0, 4.0]}, outputs)
+    fd.sweep(study, folder / "whole.nc", workers=0)
+
+    def stop(done: int, total: int) -> None:
+        if done == 2:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        fd.sweep(study, folder / "t.nc", workers=0, progress=stop)
+    done: list[int] = []
+    fd.sweep(study, folder / "t.nc", workers=0, progress=lambda k, total: done.append(k))
+    assert done == [3, 4]
+    assert (folder / "t.nc").read_bytes() == (folder / "whole.nc").read_bytes()
+
+
+def test_a_linear_output_has_the_statistics_of_its_parameter(folder):
+    """The load of a bar at rest is its weight: mean, deviation and quantiles are g times those of the mass; strata, too."""
+    scene = SCENE.replace("revolute", "fixed").replace("step = 1e-3", "step = 0.01").replace("end = 0.2", "end = 0.01")
+    (folder / "bar.toml").write_text(scene)
+    parameters = {"bodies.bar.mass": {"uniform": [1.0, 3.0]}}
+    study = fd.study(
+        folder / "bar.toml", parameters, {"load": "hinge.force: largest"}, samples=64, sampling="latin-hypercube"
+    )
+    table = fd.sweep(study, folder / "t.nc", workers=0)
+    mass = table["bodies.bar.mass"]
+    np.testing.assert_allclose(table["load"], 9.81 * mass, rtol=1e-9)
+    np.testing.assert_array_equal(np.sort(np.floor((mass - 1) * 32)), np.arange(64))  # one in each of 64 strata
+    assert table["load"].mean() == pytest.approx(9.81 * 2, rel=1 / 128)
+    assert table["load"].std() == pytest.approx(9.81 / 3**0.5, rel=0.02)
+    np.testing.assert_allclose(np.quantile(table["load"], [0.1, 0.9]), 9.81 * np.array([1.2, 2.8]), rtol=0.03)
 
 
 @pytest.mark.parametrize(("line", "says"), [
@@ -238,6 +306,34 @@ def test_what_a_study_file_says_wrongly_is_named(folder, changed, says):
 def test_lines_that_make_bodies_are_looked_at(folder, line, says):
     with pytest.raises(InputError, match=says):
         fd.study(folder / "bar.toml", {"diameter": [1, 2]}, {"angle": "hinge.angle: last"}, bodies={"bar": line})
+
+
+@pytest.mark.parametrize("change", ["a body", "a geometry", "histories"])
+def test_a_study_whose_files_have_changed_is_another(folder, change):
+    """Rows of a body before and of one after its change are not put into one table."""
+    scene = SCENE.replace("[joints.hinge]", '[bodies.other]\nfile = "other.ffr"\n[joints.hinge]')
+    (folder / "bar.toml").write_text(scene)
+    (folder / "other.ffr").write_text("a")
+    (folder / "rod.geo").write_text("b")
+    given = {"scene": folder / "bar.toml", "outputs": {"angle": "hinge.angle: last"}, "folder": folder}
+    recipe = {"other": "reduce rod.geo --set d=${d}"}
+
+    def marked(histories=False):
+        return mark(fd.study(parameters={"d": [1, 2]}, bodies=recipe, histories=histories, **given))
+
+    before = marked()
+    assert marked() == before
+    if change != "histories":
+        (folder / ("other.ffr" if change == "a body" else "rod.geo")).write_text("c")
+    assert marked(histories=change == "histories") != before
+
+
+def test_a_table_of_another_format_is_refused(folder):
+    fd.sweep(folder / "study.toml", folder / "t.nc", workers=0)
+    with h5py.File(folder / "t.nc", "r+") as file:
+        file.attrs["ffr_study"] = 2
+    with pytest.raises(InputError, match=r"t\.nc is a table of format 2, and this version reads format 1"):
+        fd.load_table(folder / "t.nc")
 
 
 def test_the_journal_of_another_study_is_refused(folder):

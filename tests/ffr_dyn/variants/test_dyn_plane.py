@@ -164,6 +164,8 @@ def test_a_declared_plane_leaves_out_what_is_across_and_refuses_what_cannot_be()
     leaning = [replace(body, rotation=(0.1, 0, 0)) if body.name == "rod" else body for body in scene.bodies]
     with pytest.raises(InputError, match=r"no axis of the frame of body 'rod' is along it"):
         flattened(replace(scene, bodies=tuple(leaning)), 0.0)
+    with pytest.raises(InputError, match="driver 'motor' prescribes a motion across it"):
+        flattened(slider_crank(plane="x"), 0.0)
     with pytest.raises(InputError, match="plane is 'w'"):
         slider_crank(plane="w")
 
@@ -336,7 +338,7 @@ def test_bores_a_hair_off_are_in_the_plane(plane, beside):
     ("make", "why"),
     [
         (lambda: slider_crank(gravity=(0, -9.81, 1.0)), "gravity has the component 1 m/s"),
-        (heavy_below, "body 'crank' is not symmetric about it: its centre of mass is 0.01 m beside"),
+        (heavy_below, "body 'crank' is not symmetric about it: its centre of mass is 0.01 m off the plane"),
         (
             lambda: slider_crank(ground={"O": (0, 0, 1e-3), "P": (1.0, 0, 0)}),
             r"joint 'main' runs aslant: its points are 0.001 m",

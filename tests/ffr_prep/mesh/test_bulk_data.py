@@ -1,6 +1,7 @@
 """Nastran bulk data in every form of field, result files of CalculiX, and the materials that mesh files carry."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -167,6 +168,49 @@ def test_what_cannot_be_read_is_named(tmp_path, line, said):
         fp.read_mesh(tmp_path / "a.bdf")
 
 
+@pytest.mark.parametrize("backwards", [False, True])
+def test_continuations_may_stand_anywhere_in_a_deck(tmp_path, backwards):
+    """By their marks; cards with marks and nothing that goes on with them are whole."""
+    mesh = box("hex20")
+    cards_of = deck(mesh, "hex20", small).splitlines()
+    begin = next(k for k, line in enumerate(cards_of) if line.startswith("CHEXA"))
+    first, rest, count = [], [], 0
+    for line in cards_of[begin:]:
+        if line.startswith(("CHEXA", " ", "+")):
+            own, count = count, count + (not line.startswith("CHEXA"))
+            name = line[:8] if line.startswith("CHEXA") else f"+M{len(first) - 1}X{own}"
+            count = 0 if line.startswith("CHEXA") else count
+            mark = f"+M{len(first) - (not line.startswith('CHEXA'))}X{count}"
+            (first if line.startswith("CHEXA") else rest).append(f"{name:<8}{line[8:72]:<64}{mark}")
+    text = [*cards_of[:begin], *first, *(rest[::-1] if backwards else rest), "ENDDATA"]
+    (tmp_path / "a.bdf").write_text("\n".join(text) + "\n")
+    given = fp.read_mesh(tmp_path / "a.bdf")  # elements in the order in which they are complete
+    order = np.argsort(given.blocks[0].nodes[:, 0])
+    assert_same_mesh(replace(given, blocks=(replace(given.blocks[0], nodes=given.blocks[0].nodes[order]),)), mesh)
+
+
+def test_marks_that_no_card_has_are_told(tmp_path):
+    """The card above them ends with another mark; where it has none, it is the one that goes on."""
+    (tmp_path / "a.bdf").write_text(f"{'CHEXA':72}+A\n{'+B':8}{1:8}\n")
+    with pytest.raises(InputError, match=r"line 2 goes on with a card that ends with the mark \+B, but none does"):
+        list(cards(tmp_path / "a.bdf"))
+    (tmp_path / "a.bdf").write_text(f"CHEXA\n{'+B':8}{1:8}\n")
+    (card,) = cards(tmp_path / "a.bdf")
+    assert card.integer(9) == 1
+
+
+def test_fields_beyond_a_line_and_repeated_cards_are_refused(tmp_path):
+    text = deck(box("tet4"), "tet4", free)
+    for line, said in (
+        ("CTETRA,9,7,1,2,3,4,5,6,7,8,9,10", "has 12 fields behind the name; 8 is the most"),
+        ("CTETRA,9,7,1,2,3,4,5,6,7", "has 9 fields behind the name; 8 is the most"),
+        ("=,*(1),=,*(10.),==", "repeats the card above it"),
+    ):
+        (tmp_path / "a.bdf").write_text(text.replace("ENDDATA", f"{line}\nENDDATA", 1))
+        with pytest.raises(InputError, match=said):
+            fp.read_mesh(tmp_path / "a.bdf")
+
+
 def test_a_continuation_of_nothing_is_refused(tmp_path):
     (tmp_path / "a.bdf").write_text("+A1     1       2\n")
     with pytest.raises(InputError, match="line 1 goes on with a card, but there is none"):
@@ -271,6 +315,38 @@ def test_orthotropic_materials_and_those_that_are_not_read(tmp_path):
     (tmp_path / "d.inp").write_text(inp("m").partition("*MATERIAL")[0])
     with pytest.raises(InputError, match="no material for its elements; give --material"):
         fp.file_materials(tmp_path / "d.inp", mesh)
+
+
+@pytest.mark.parametrize(
+    ("elastic", "more", "name"),
+    [
+        ("\n2.1e11, .3, 20.\n1.9e11, .3, 300.", "", "Stahl at 20., the first of 2 temperatures"),
+        ("\n2.1e11, .3", "*PLASTIC\n2e8, 0.\n*DAMPING, ALPHA=1.", "Stahl, without its *PLASTIC, without its *DAMPING"),
+        (
+            ", TYPE=ENGINEERING CONSTANTS\n1e10, 8e8, 5e8, .4, .3, .3, 7e8, 7e8\n8e7, 20."
+            "\n9e9, 8e8, 5e8, .4, .3, .3, 7e8, 7e8\n8e7, 90.",
+            "",
+            "Stahl at 20., the first of 2 temperatures",
+        ),
+    ],
+)
+def test_what_of_a_material_is_not_taken_is_told_with_its_name(tmp_path, elastic, more, name):
+    (tmp_path / "a.inp").write_text(inp("m", elastic, more))
+    (material,) = fp.file_materials(tmp_path / "a.inp", fp.read_mesh(tmp_path / "a.inp")).values()
+    assert material.name == name
+    (tmp_path / "b.inp").write_text(inp("m"))
+    (plain,) = fp.file_materials(tmp_path / "b.inp", fp.read_mesh(tmp_path / "b.inp")).values()
+    assert plain.name == "Stahl"
+
+
+@pytest.mark.parametrize("before", ["ENDDATA", "BEGIN BULK"])
+def test_densities_that_are_weights(tmp_path, before):
+    """PARAM,WTMASS makes mass of them, here of N/m^3, wherever it stands."""
+    text = deck(box("tet4"), "tet4", free).replace("ENDDATA", "PSOLID,7,3\nMAT1,3,2.1+11,,.3,77008.5\nENDDATA", 1)
+    text = text.replace(before, f"param,wtmass,.101936 $ 1/g\n{before}", 1)
+    (tmp_path / "a.bdf").write_text(text)
+    (material,) = fp.file_materials(tmp_path / "a.bdf", fp.read_mesh(tmp_path / "a.bdf")).values()
+    assert material.rho == pytest.approx(77008.5 * 0.101936)
 
 
 def test_nastran_materials(tmp_path):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import replace
 from functools import cache
 
@@ -353,6 +354,39 @@ def test_names_of_faces_come_from_the_text_of_the_file(parts, tmp_path):
     (named,) = [face for face in faces.faces if face.label]
     assert named.label == "lid's side"
     assert fp.found_faces(faces, named.label) == (named.name,)
+
+
+@pytest.mark.parametrize("code", ["utf-8", "latin-1"])
+@pytest.mark.parametrize("text", ["Größe Ø5", r"Gr\X\F6\X\DFe \X2\00D8\X0\5", r"Gr\S\v\S\_e \X4\000000D8\X0\5"])
+def test_letters_of_names_are_read_however_the_file_spells_them(parts, tmp_path, text, code):
+    """ISO 10303-21, 6.4.3; and as they are, which most programs write."""
+    named = parts["plate"].read_text().replace("ADVANCED_FACE(''", f"ADVANCED_FACE('{text}'", 1)
+    (tmp_path / "plate.step").write_text(named, encoding=code)
+    faces = fp.faces(tmp_path / "plate.step")
+    assert [face.label for face in faces.faces if face.label] == ["Größe Ø5"]
+    assert fp.found_faces(faces, "Größe*") == ("surface_1",)
+
+
+@pytest.mark.parametrize("letters", ["Größe", "Größe".encode().decode("latin-1")])
+def test_letters_of_solids_are_read(parts, tmp_path, letters):
+    """Programs built on the CAD library write the bytes of UTF-8 as letters."""
+    named = re.sub(r"PRODUCT\('[^']*',\s*'[^']*'", f"PRODUCT('{letters}','{letters}'", parts["plate"].read_text())
+    (tmp_path / "plate.step").write_text(named, encoding="utf-8")
+    assert {face.solids for face in fp.faces(tmp_path / "plate.step").faces} == {("Größe",)}
+
+
+def test_cones_with_a_tip_are_meshed(tmp_path):
+    """A drilled hole ends in one; the curvature of a cone grows without bound there, and with it the number of elements."""
+
+    def drilled(occ):
+        block, hole = occ.addBox(0, 0, 0, 20, 20, 20), occ.addCylinder(10, 10, 20, 0, 0, -8, 3)
+        occ.cut([(3, block)], [(3, hole), (3, occ.addCone(10, 10, 12, 0, 0, -2, 3, 0))])
+
+    path = written(drilled, tmp_path / "drilled.step")
+    (cone,) = of_kind(fp.faces(path), "cone")
+    assert cone.radius == pytest.approx(math.atan2(3, 2))
+    assert cone.area == pytest.approx(math.pi * 3 * math.hypot(3, 2) * 1e-6)
+    assert 500 < sum(len(block.nodes) for block in read_mesh(path, size=4.0).blocks) < 20_000
 
 
 def test_names_are_not_told_where_they_may_be_of_other_faces(parts):

@@ -55,7 +55,7 @@ def test_unknowns_without_a_place_come_last():
     bordered = sp.csr_array(T.T @ A @ T + 1e9 * sp.eye_array(A.shape[0] + 6))
     positions = np.vstack([positions, np.full((6, 3), np.nan)])
     factor = cholesky(bordered, positions)
-    assert set(factor.order[-6:]) == set(range(A.shape[0], A.shape[0] + 6))
+    assert set(factor.matrix.order[-6:]) == set(range(A.shape[0], A.shape[0] + 6))
     assert_solves(bordered, positions)
 
 
@@ -75,11 +75,28 @@ def test_unknowns_that_are_held_are_zero(held):
 
 
 def test_a_factor_takes_little_more_than_its_lower_triangle():
+    """And of leaves little more than the triangle of their own: their other rows are those of the matrix."""
     A, positions = clamped("tet10", (12, 5, 4))
     fronts = cholesky(A, positions).fronts
-    own, rest = np.diff(fronts.starts), np.diff(fronts.ends)
-    lower = (own * (own + 1) // 2 + own * rest).sum()
-    assert lower < fronts.panels.size < 1.05 * lower
+    own, rest, leaf = np.diff(fronts.starts), np.diff(fronts.ends), fronts.children == 0
+    lower = own * (own + 1) // 2 + np.where(leaf, 0, own * rest)
+    assert lower.sum() < fronts.panels.size < 1.12 * lower.sum()
+    assert leaf.sum() > 20
+    assert fronts.panels.size < 0.8 * (lower + np.where(leaf, own * rest, 0)).sum()
+
+
+@pytest.mark.parametrize("columns", [1, 4, 7, 8])
+def test_a_matrix_that_is_one_leaf_or_all_leaves(columns):
+    """Points that nothing connects but a last one, which follows them all."""
+    A, positions = clamped("tet4", (1, 1, 1))
+    assert_solves(A, positions, columns)
+    count = 90
+    star = sp.lil_array((count, count))
+    star[-1, :-1] = star[:-1, -1] = -1.0
+    star.setdiag([*np.arange(2.0, count + 1), 2.0 * count])
+    positions = np.random.default_rng(3).normal(size=(count, 3))
+    positions[-1] = np.nan
+    assert_solves(star, positions, columns)
 
 
 def test_graphs_that_fall_apart_when_cut():

@@ -46,6 +46,23 @@ def test_equal_frequencies_are_all_found():
     assert scipy.linalg.subspace_angles(vectors, modes[:, :9]).max() < 1e-7
 
 
+@pytest.mark.parametrize("copies", [6, 9])
+def test_more_equal_frequencies_than_a_block_has_vectors_are_all_found(copies):
+    omega2 = np.repeat(np.arange(1.0, 51.0), copies) ** 2
+    flexibility, M, start, modes = problem(omega2)
+    found, vectors = lowest_modes(flexibility, M, start, 3 * copies, most=len(omega2))
+    np.testing.assert_allclose(found, omega2[: 3 * copies], rtol=1e-12)
+    assert scipy.linalg.subspace_angles(vectors, modes[:, : 3 * copies]).max() < 1e-7
+
+
+def test_more_modes_than_a_panel_has_rows():
+    omega2 = np.arange(1.0, 401.0) ** 2
+    flexibility, M, start, modes = problem(omega2)
+    found, vectors = lowest_modes(flexibility, M, start, 70, most=400)
+    np.testing.assert_allclose(found, omega2[:70], rtol=1e-11)
+    np.testing.assert_allclose(np.abs(vectors.T @ (M @ modes[:, :70])), np.eye(70), atol=1e-6)
+
+
 def test_directions_without_flexibility_do_not_disturb():
     omega2 = np.concatenate([np.arange(1.0, 61.0), np.full(240, np.inf)])
     flexibility, M, start, _ = problem(omega2)
