@@ -60,6 +60,7 @@ MOST_ROWS = 1000  # of the first call
 SECONDS_PER_CALL = 0.25  # of the compiled loop, between two looks at progress, file and keyboard
 
 _MOST_STEPS = 1e15  # of a run: decades of a processor
+_MOST_ROWS = 1e9  # each of hundreds of bytes at least
 
 
 @dataclass
@@ -173,6 +174,11 @@ def _counts(span: float, output_step: float, step: float) -> tuple[int, int]:
         )
     if rows < 1 or abs(rows * output_step - span) > 1e-9 * span:
         raise InputError(f"the duration {span} s is not a multiple of the output step {output_step} s")
+    if rows > _MOST_ROWS:
+        raise InputError(
+            f"an output step of {output_step:g} s makes {float(rows):.2g} rows of {span:g} s, which no disk holds; give a "
+            "longer output step"
+        )
     if substeps * rows > _MOST_STEPS:
         raise InputError(
             f"steps of {step:g} s make {float(substeps) * rows:.2g} steps of {span:g} s, which no computer takes; give a "

@@ -20,9 +20,10 @@ def require_inertia(scene: Scene, place: Layout) -> None:
         if body.dropped:  # `ffr_dyn.consistency.dropped_terms` looks at these
             continue
         if motion := _immovable(body.model, tuple(place.active(b))):
+            flexible = ", keep fewer modes, or, where it is held fixed, import it with --held" if body.model.n else ""
             raise InputError(
                 f"body {body.name!r} cannot move: it has no inertia left for {motion}; give it mass and inertia about all "
-                "axes, keep fewer modes, or, where it is held fixed, import it with --held"
+                f"axes{flexible}"
             )
 
 

@@ -38,9 +38,11 @@ BACK = -0.5  # part of a step that the following one may go back
 OPEN = (
     0.25  # rad, or part of the size: motion to the rows beyond which a step is that alone; its shift counts as infinite
 )
-UNLOADED = 0.01  # of the loads: a scene that bears next to nothing
+UNLOADED = 0.01  # of the loads: a scene that bears little
+TRACE = 1e-6  # and one that bears next to nothing
 # Of `jumped`: the logarithm by which loads change at once, at most and least; a Newton step over the one before.
 LARGEST_CHANGE, LEAST_CHANGE, CONTRACTS = 1.2, 1e-3, 0.5
+LINEAR = 0.1  # the last of what hardly bends the scene's response
 SAME = 1e-3  # of how far an equilibrium is from the start: two that are one
 ATTEMPTS, HALVINGS = 40, 3  # shifts four times as large each; and between the last of them and the one before
 
@@ -136,19 +138,21 @@ def jumped(system: System, time: float, x: Array, sizes: Array, found: Equilibri
     """
     problem = _Problem(system, time, total_mass_matrix(system.scene, system.layout, x), sizes)
     start = Equilibrium(x[None], None, problem.balance(x, None, {}, 1.0), (), False)
-    small = _newton(problem, start, UNLOADED, ITERATIONS)
+    small, reached = _lightly_loaded(problem, start)
     if not small.found or _apart(problem, x, small.path[-1]) > _apart(problem, x, found.path[-1]):
         return ""  # small loads do not know of where the scene is drawn
-    off, share = _followed(problem, found, 1.0, UNLOADED)
     far = _apart(problem, x, found.path[-1])
-    if share == UNLOADED and _apart(problem, off.path[-1], small.path[-1]) <= SAME * max(far, SAME):
-        return ""
-    grown, share = _followed(problem, small, UNLOADED, 1.0)
-    if share < 1.0:
+    grown = small
+    if reached == UNLOADED:
+        off, share = _followed(problem, found, 1.0, UNLOADED)
+        if share == UNLOADED and _apart(problem, off.path[-1], small.path[-1]) <= SAME * max(far, SAME):
+            return ""
+        grown, reached = _followed(problem, small, UNLOADED, 1.0)
+    if reached < 1.0:
         return (
-            f"loads that grow find no equilibrium near the last one beyond {share:.3g} of their size: there the scene jumps, "
-            "or a force has a pole, and the equilibrium found is on another branch; look at smaller loads, or run forward "
-            "with damping"
+            f"loads that grow find no equilibrium near the last one beyond {reached:.3g} of their size: there the scene "
+            "jumps, or a force has a pole, and the equilibrium found is on another branch; look at smaller loads, or run "
+            "forward with damping"
         )
     if _apart(problem, grown.path[-1], found.path[-1]) <= SAME * max(far, SAME):
         return ""
@@ -158,18 +162,45 @@ def jumped(system: System, time: float, x: Array, sizes: Array, found: Equilibri
     )
 
 
+def _lightly_loaded(problem: _Problem, start: Equilibrium) -> tuple[Equilibrium, float]:
+    """The equilibrium near the start under a small share of the loads, and this share.
+
+    Newton's steps may lead over a fold even there: what a trace of the loads brings is followed to that share, at once
+    where the response is nearly linear.
+    """
+    trace = _newton(problem, start, TRACE, ITERATIONS)
+    at_once = _newton(problem, trace if trace.found else start, UNLOADED, ITERATIONS)
+    linear = at_once.found and _contracts(at_once, LINEAR)
+    if not trace.found or (linear and _returns(problem, at_once, trace, TRACE)):
+        return at_once, UNLOADED
+    return _followed(problem, trace, TRACE, UNLOADED)
+
+
+def _contracts(found: Equilibrium, ratio: float) -> bool:
+    """Whether each step but the last, which is rounding, was no longer than this part of the one before."""
+    lengths = np.array(found.steps[:-1])
+    return not (lengths[1:] > ratio * lengths[:-1]).any()
+
+
 def _followed(problem: _Problem, now: Equilibrium, share: float, goal: float) -> tuple[Equilibrium, float]:
     """The equilibrium as the share of the loads goes to a goal, and the share that is reached on its branch."""
     size, way = LARGEST_CHANGE, np.sign(goal - share)
     while share != goal and size > LEAST_CHANGE:
         wanted = goal if abs(np.log(goal / share)) <= size else share * np.exp(way * size)
         there = _newton(problem, now, wanted, ITERATIONS_OF_A_SHARE)
-        lengths = np.array(there.steps[:-1])
-        if not there.found or (lengths[1:] > CONTRACTS * lengths[:-1]).any():
+        near = there.found and _contracts(there, CONTRACTS)
+        if not near or (way > 0 and not _returns(problem, there, now, share)):
             size /= 2
             continue
         share, now, size = wanted, there, min(2 * size, LARGEST_CHANGE)
     return now, share
+
+
+def _returns(problem: _Problem, there: Equilibrium, now: Equilibrium, share: float) -> bool:
+    """Whether an equilibrium leads back to the one before as its loads are taken back to that one's share."""
+    back = _newton(problem, there, share, ITERATIONS_OF_A_SHARE)
+    moved_by = _apart(problem, now.path[-1], there.path[-1])
+    return back.found and _apart(problem, back.path[-1], now.path[-1]) <= SAME * max(moved_by, SAME)
 
 
 def _apart(problem: _Problem, x: Array, other: Array) -> float:

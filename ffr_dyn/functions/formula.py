@@ -1,4 +1,5 @@
-"""Formulas as text: numbers, + - * / **, pi, named functions, t, parameters, inputs, measured quantities; nothing else.
+"""Formulas as text: numbers, with units or without, + - * / **, pi, named functions, t, parameters, inputs, measured
+quantities; nothing else.
 
 formula("0.1 * smooth(t / 0.2) * sin(2 * pi * f * t)", {"f": 12.0}) is a `TimeFunction` with exact derivatives, which the
 kernels evaluate. The text is parsed, never run: it can name what is listed above and reach nothing.
@@ -10,11 +11,13 @@ import ast
 import difflib
 import math
 import re
+from collections import ChainMap
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from ffr_dyn.functions.operations import ADD, DIVIDE, EXP, FUNCTIONS, LOG, MAX, MULTIPLY, POWER, SUBTRACT, value
+from ffr_dyn.functions.quantities import Marked, check_dimension, marked
 from ffr_dyn.functions.time_functions import (
     OPERATION,
     POLYNOMIAL,
@@ -25,6 +28,7 @@ from ffr_dyn.functions.time_functions import (
     polynomial,
 )
 from ffr_prep.common.errors import InputError
+from ffr_prep.common.units import is_unit
 
 CONSTANTS = {"pi": math.pi, "e": math.e}
 TIME = polynomial(0.0, 1.0)
@@ -53,14 +57,17 @@ class Operation:
 Expression = TimeFunction | Measured | Operation
 
 
-def formula(text: str, parameters: Mapping[str, Any] = {}, what: str = "formula") -> TimeFunction:
+def formula(
+    text: str, parameters: Mapping[str, Any] = {}, what: str = "formula", unit: str | None = None
+) -> TimeFunction:
     """The function of time that a formula describes, with exact derivatives.
 
+    unit : in which it is wanted, SI; None for any
     Raises InputError that names `what`, the place in the text and the nearest known name.
 
     >>> push = fd.formula("100 * sin(2 * pi * f * t)", {"f": 5.0})
     """
-    found = parse(text, parameters, what)
+    found = parse(text, parameters, what, unit)
     if isinstance(found, TimeFunction):
         return found
     raise InputError(
@@ -69,9 +76,9 @@ def formula(text: str, parameters: Mapping[str, Any] = {}, what: str = "formula"
     )
 
 
-def number(text: str, parameters: Mapping[str, Any] = {}, what: str = "formula") -> float:
+def number(text: str, parameters: Mapping[str, Any] = {}, what: str = "formula", unit: str | None = None) -> float:
     """The value of a formula without t. Raises InputError when it depends on time or on the motion."""
-    function = formula(text, parameters, what)
+    function = formula(text, parameters, what, unit)
     if not is_constant(function):
         raise InputError(f"{what}: {text!r} depends on t; a number is needed here")
     return function.data[0]
@@ -82,17 +89,23 @@ def is_constant(function: TimeFunction) -> bool:
     return function.kind == POLYNOMIAL and len(function.data) == 1
 
 
-def parse(text: str, parameters: Mapping[str, Any], what: str) -> Expression:
+def parse(text: str, parameters: Mapping[str, Any], what: str, unit: str | None = None) -> Expression:
     """A formula as a function of time or, where it names measured quantities, as an expression of those.
 
     Names that are no parameters are taken for measured quantities when they contain a dot.
+    unit : in which it is wanted, SI; None for any (`ffr_dyn.functions.quantities`)
     """
     try:
-        tree = ast.parse(text.strip(), mode="eval").body
+        plain = marked(text.strip())
+        names = ChainMap(dict(plain.quantities), parameters)  # type: ignore[arg-type]
+        tree = ast.parse(plain.text, mode="eval").body
+        check_dimension(tree, plain.quantities, unit)
+    except InputError as error:
+        raise InputError(f"{what}: in the formula {text!r}: {error}") from None
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
         reason = error.msg if isinstance(error, SyntaxError) else error
         raise InputError(f"{what}: {text!r} is not a formula ({reason})") from None
-    return _Reader(text, parameters, what).read(tree, 0)
+    return _Reader(text, plain, names, what).read(tree, 0)
 
 
 def names_in(expression: Expression) -> Iterator[str]:
@@ -122,6 +135,7 @@ class _Reader:
     """Turns the syntax tree of one text into an expression, and refuses whatever is not listed."""
 
     text: str
+    plain: Marked
     parameters: Mapping[str, Any]
     what: str
 
@@ -160,7 +174,9 @@ class _Reader:
             return TIME
         if "." in name:
             return Measured(name)
-        known = [*self.parameters, *CONSTANTS, "t", *FUNCTIONS]
+        if is_unit(name):
+            raise self._refusal(node, "is not known; if it is a unit, write it behind its number, without *: '3 N m'")
+        known = [*(one for one in self.parameters if one.isascii()), *CONSTANTS, "t", *FUNCTIONS]
         raise self._refusal(node, f"is not known{_nearest(name, known)}")
 
     def _parameter(self, node: ast.expr, given: object) -> Expression:
@@ -181,7 +197,7 @@ class _Reader:
         raise self._refusal(node, "is not a name")
 
     def _call(self, node: ast.Call, depth: int) -> Expression:
-        name = node.func.id if isinstance(node.func, ast.Name) else ast.unparse(node.func)
+        name = self.plain.back(ast.unparse(node.func))
         if name not in FUNCTIONS:
             raise self._refusal(node, f"calls {name!r}, which is not a known function{_nearest(name, FUNCTIONS)}")
         op = FUNCTIONS[name]
@@ -210,7 +226,7 @@ class _Reader:
             raise self._refusal(node, f"has no value ({error})") from None
 
     def _refusal(self, node: ast.expr, why: str) -> InputError:
-        piece = ast.get_source_segment(self.text.strip(), node) or self.text
+        piece = self.plain.back(ast.get_source_segment(self.plain.text, node) or self.plain.text)
         return InputError(f"{self.what}: in the formula {self.text!r}, {piece[:80]!r} {why}")
 
 

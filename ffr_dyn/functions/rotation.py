@@ -14,6 +14,8 @@ import numpy as np
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 
+_TURNED = 1e6  # rad; beyond, the last digits of an angle are coarser than any drawing
+
 
 def skew(a: Array) -> Array:
     """(3,) -> (3, 3) with skew(a) b = a x b."""
@@ -147,6 +149,10 @@ def euler_parameters(rotation: Any, what: str = "rotation") -> Array:
     if not np.isfinite(value).all():
         raise InputError(f"{what} holds values that are not finite: {value}")
     if value.shape == (3,):
+        if not np.abs(value).max() < _TURNED:
+            raise InputError(
+                f"{what}: a rotation vector of {value.tolist()} rad has no angle left; give it within a turn"
+            )
         return from_vector(value)
     if value.shape == (4,):
         if abs(np.linalg.norm(value) - 1) > 1e-6:
@@ -171,10 +177,11 @@ def triad(axis: Array, what: str = "axis") -> Array:
         value = np.zeros(0)
     if value.shape == (3, 3):
         return rotation_matrix(euler_parameters(value, what))
-    if value.shape != (3,) or not np.isfinite(value).all() or not np.linalg.norm(value) > 0:
+    if value.shape != (3,) or not np.isfinite(value).all() or not np.abs(value).max() > np.finfo(float).tiny:
         raise InputError(
             f"{what} must be a vector of three numbers that is not zero, or a (3, 3) frame; it is {axis!r}"
         )
+    value = value / np.abs(value).max()  # whose square is a number, whatever its length
     h = value / np.linalg.norm(value)
     k = int(np.argmin(np.abs(h)))
     f = -h[k] * h

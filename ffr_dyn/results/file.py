@@ -88,7 +88,9 @@ def _reading(path: Path) -> Iterator[h5py.File]:
     """A result file, open; whatever is wrong with it becomes an InputError."""
     if path.is_dir():
         raise InputError(f"{path} is a folder; name a result file in it")
-    if not path.is_file():
+    if path.exists() and not path.is_file():
+        raise InputError(f"{path} is no ordinary file; name a result file")
+    if not path.exists():
         raise InputError(
             f"result file {path} does not exist; make it with `ffr-dyn run SCENE.toml -o {path.name}`{nearest_file(path)}"
         )

@@ -39,6 +39,8 @@ class Coupling:
         check_own_name("coupling", self.name)
         for key in ("first", "second"):
             check_name(f"coupling {self.name!r}", key, getattr(self, key))
+        if self.first == self.second:
+            raise InputError(f"coupling {self.name!r} couples {self.first!r} to itself: name another joint coordinate")
         if not (np.isfinite([self.ratio, self.offset]).all() and self.ratio != 0):
             raise InputError(
                 f"coupling {self.name!r}: ratio {self.ratio} and offset {self.offset} must be finite, the ratio not zero"

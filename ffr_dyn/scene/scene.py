@@ -25,7 +25,7 @@ from ffr_dyn.scene.own_frame import OwnFrame
 from ffr_dyn.scene.parts import owner, taken_apart, wholes
 from ffr_dyn.scene.sensors import AnyMeasurement, Measurement, SectionMeasurement, StressMeasurement
 from ffr_dyn.scene.stress_sensors import measured_modes, nearest_surface
-from ffr_prep.body import FlexibleBody
+from ffr_prep.body import FlexibleBody, check_point
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.brief import Brief, Rows, in_short, listed, numbers
 from ffr_prep.common.errors import InputError
@@ -33,6 +33,7 @@ from ffr_prep.common.errors import InputError
 GROUND = "ground"
 # Groups of inertia integrals that a body can do without: I3 and the parts, skew and symmetric, of the other two.
 INERTIA_TERMS = ("I3", "I4", "I5", "I8", "I9")
+_MOST = 1e60  # of places and rates in SI units, so that products of them are numbers still
 RESERVED = (GROUND, "energy", "constraint", "measured", "time", "geometry")
 
 
@@ -210,6 +211,8 @@ class Scene(Brief):
         if not isinstance(self.ground, Mapping):
             raise InputError(f"ground is {self.ground!r}; give points by name, such as {{'wall': (0, 0, 0)}}")
         points = {key: _vector(at, 3, f"ground point {key!r}") for key, at in self.ground.items()}
+        for key, at in points.items():
+            check_point("ground point", key, at)
         object.__setattr__(self, "ground", points)
         steady, base = _split_gravity(self.gravity, _acceleration("base_acceleration", self.base_acceleration))
         object.__setattr__(self, "gravity", _vector(steady, 3, "gravity"))
@@ -474,7 +477,9 @@ def _vector(value: Any, size: int, what: str) -> Array:
         raise InputError(f"{what} must be {size} numbers, not {value!r}") from None
     if vector.shape != (size,):
         raise InputError(f"{what} must be {size} numbers, not {value!r}")
-    if not np.isfinite(vector).all():
-        raise InputError(f"{what} holds values that are not finite: {value!r}")
+    if not (np.abs(vector) < _MOST).all():
+        raise InputError(
+            f"{what} holds values that are not finite, or beyond {_MOST:g}: {value!r}; give them in SI units"
+        )
     vector.setflags(write=False)
     return vector

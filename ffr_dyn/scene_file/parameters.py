@@ -9,24 +9,12 @@ from typing import Any
 
 from ffr_dyn.functions.formula import CONSTANTS, number
 from ffr_dyn.functions.operations import FUNCTIONS
+from ffr_dyn.functions.quantities import WithUnit, with_unit
 from ffr_prep.common.errors import InputError
 from ffr_prep.common.units import split_quantity, to_si
 
 _REFERENCE = re.compile(r"\$\{\s*([^{}]*?)\s*\}")
 _NAME = re.compile(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)*")
-
-
-class WithUnit(float):
-    """A number in SI units that remembers the unit it was given in."""
-
-    unit: str
-
-
-def with_unit(value: float, unit: str) -> WithUnit:
-    """The number in SI units."""
-    found = WithUnit(to_si(value, unit))
-    found.unit = unit
-    return found
 
 
 def flattened(table: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
@@ -119,7 +107,7 @@ def as_number(text: str, parameters: Mapping[str, Any], what: str, unit: str | N
             return fitting(named, unit)
     except InputError as error:
         raise InputError(f"{what}: {text!r}: {error}") from None
-    return number(text, parameters, what)
+    return number(text, parameters, what, unit)
 
 
 def fitting(value: float, unit: str | None) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,11 +24,12 @@ from pydantic_core import CoreSchema, core_schema
 
 from ffr_dyn.functions.curves import Curve
 from ffr_dyn.functions.formula import Expression, is_constant, parse
+from ffr_dyn.functions.quantities import WithUnit
 from ffr_dyn.functions.time_functions import HARMONIC, TimeFunction, constant, harmonic, piecewise, polynomial, table
 from ffr_dyn.scene.fields import Six, Unit
-from ffr_dyn.scene_file.parameters import WithUnit, as_number, fitting
+from ffr_dyn.scene_file.parameters import as_number, fitting
 from ffr_prep.common.errors import InputError
-from ffr_prep.common.reading import reading
+from ffr_prep.common.reading import read_text, reading
 from ffr_prep.common.strict import Strict
 from ffr_prep.common.units import split_quantity
 
@@ -180,6 +182,8 @@ def check_units(given: Iterable[tuple[Any, str]], info: ValidationInfo) -> None:
             fitting(text, unit)
         elif isinstance(text, str) and (split_quantity(text) or isinstance(parameters.get(text.strip()), WithUnit)):
             as_number(text, parameters, "it", unit)
+        elif isinstance(text, str):
+            parse(text, parameters, "it", unit)
 
 
 def _of_function(value: Any, unit: str) -> Iterator[tuple[Any, str]]:
@@ -232,10 +236,13 @@ def _piecewise(entry: PiecewiseEntry) -> TimeFunction:
 
 
 def _read_table(file: Path) -> TimeFunction:
-    with reading(file, "a file of two columns of numbers, time and value", ValueError):
-        columns = np.loadtxt(file, delimiter=",", ndmin=2, comments="#")
+    what = "a file of two columns of numbers, time and value"
+    with reading(file, what, ValueError), warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)  # of a file without numbers, whose columns are counted below
+        columns = np.loadtxt(read_text(file, what).splitlines(), delimiter=",", ndmin=2, comments="#")
     if columns.shape[1] != 2:
-        raise InputError(f"{file} has {columns.shape[1]} columns; it needs two, time and value")
+        found = f"{columns.shape[1]} columns" if columns.size else "no numbers"
+        raise InputError(f"{file} has {found}; it needs two columns, time and value")
     return table(columns[:, 0], columns[:, 1])
 
 

@@ -220,7 +220,7 @@ def _says_values(table: Mapping[str, Any]) -> bool:
 
 
 def _are_numbers(given: Sequence[Any]) -> bool:
-    return all(isinstance(one, (int, float)) and not isinstance(one, bool) for one in given)
+    return all(isinstance(one, (int, float)) and not isinstance(one, bool) and abs(one) < math.inf for one in given)
 
 
 def _is_value(one: Any) -> bool:

@@ -10,7 +10,7 @@ coordinates q (n,) [m sqrt(kg)]. Integrals over the mass carry the suffix ``_dm`
 The numbered invariants I1...I9 and Shabana's S_bar family are read-only views of these integrals.
 """
 
-from ffr_prep.body.constructors import recombined, rigid_body, truncated, with_point
+from ffr_prep.body.constructors import check_point, recombined, rigid_body, truncated, with_point
 from ffr_prep.body.damping import Damping, damped, with_damping
 from ffr_prep.body.file import content_hash, load_body, save_arrays, save_body, surface_arrays, surface_of
 from ffr_prep.body.frame_change import interface_motions, mass_of_motions
@@ -58,6 +58,7 @@ __all__ = [
     "Surface",
     "at_places",
     "axial",
+    "check_point",
     "compressed",
     "compressed_beside",
     "content_hash",

@@ -46,6 +46,8 @@ def rigid_body(
             f"body {name!r}: mass {mass:g} kg, inertia and centre of mass must be finite; give them in SI units"
         )
     places = {key: np.asarray(at, float) for key, at in (points or {}).items()}
+    for key, at in places.items():
+        check_point(f"body {name!r}: point", key, at)
     numbers = tuple((key, at.shape, at.tobytes()) for key, at in places.items())
     made = _rigid(name, float(mass), tensor.tobytes(), c.tobytes(), numbers)
     return made if surface is None else replace(made, surface=surface)
@@ -71,6 +73,16 @@ def _rigid(
         interfaces=tuple(Interface(key, at, nothing, nothing) for key, at in places),
         provenance={"kind": "rigid"},
     )
+
+
+def check_point(what: str, name: str, at: ArrayLike) -> None:
+    """BodyError for a point whose name no quantity could carry, or that is so far away that products of lengths overflow."""
+    if not name or "." in name or not name.isprintable():
+        raise BodyError(
+            f"{what} {name!r} cannot be called so: a name has no dot and no line break, and a letter at least"
+        )
+    if not np.abs(np.asarray(at, float)).max() < _MOST:
+        raise BodyError(f"{what} {name!r} is at {np.asarray(at, float).tolist()} m: coordinates are below {_MOST:g} m")
 
 
 def truncated(body: FlexibleBody, modes: int | Array) -> FlexibleBody:

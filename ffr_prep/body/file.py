@@ -143,6 +143,8 @@ def load_body(path: str | Path) -> FlexibleBody:
     """
     path = Path(path)
     note_input(path)
+    if path.exists() and not (path.is_file() or path.is_dir()):
+        raise BodyError(f"body file {path} is no ordinary file; name one that `ffr-prep reduce` has made")
     try:
         return _with_parts(*_read(path))
     except FileNotFoundError:

@@ -42,7 +42,8 @@ def immovable(body: FlexibleBody, active: Sequence[int] = range(6)) -> str:
     scaled = own / np.outer(scale, scale)
     values, vectors = np.linalg.eigh(scaled)
     if values[0] <= _NOTHING:
-        return f"{_MOTIONS[rigid[int(np.abs(vectors[:, 0]).argmax())]]}: it has none"
+        turning = np.array(rigid) >= 3  # what has a mass, and no inertia, turns about a line
+        return f"{_MOTIONS[rigid[int((turning * np.abs(vectors[:, 0])).argmax())]]}: it has none"
     if not body.n:
         return ""
     root = np.linalg.cholesky(scaled)

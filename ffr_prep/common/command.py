@@ -51,6 +51,8 @@ def reserve(option: str, path: Path | None, suffixes: Sequence[str] = (), usual:
     """
     if path is None:
         return
+    if str(path) == "-":
+        raise InputError(f"{option} -: nothing is written to the standard output; name a file")
     if suffixes and path.suffix.lower() not in suffixes:
         raise InputError(
             f"{option} {path}: it is written as {' or '.join(suffixes)}, not {path.suffix or 'without a suffix'}"
@@ -73,9 +75,10 @@ def check_ending(option: str, path: Path, usual: str) -> None:
 
 
 def check_folder(option: str, path: Path) -> None:
-    """InputError where a folder for several files is asked for and a file stands."""
-    if path.exists() and not path.is_dir():
-        raise InputError(f"{option} {path} is a file; name a folder")
+    """InputError where a folder for several files is asked for and a file stands there, or above it."""
+    there = next((at for at in (path, *path.parents) if at.exists()), path)
+    if there.exists() and not there.is_dir():
+        raise InputError(f"{option} {path}: {there} is a file; name a folder")
 
 
 def run_command(group: click.Group, program: str, arguments: Sequence[str] | None = None) -> None:

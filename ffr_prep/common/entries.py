@@ -7,10 +7,10 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Iterator, Mapping
-from difflib import get_close_matches
 from typing import Any
 
 from ffr_prep.common.errors import InputError
+from ffr_prep.common.registry import choice
 
 Keys = tuple[str, ...]
 
@@ -44,8 +44,11 @@ def assignments(texts: tuple[str, ...]) -> dict[str, str]:
     for text in texts:
         if "=" not in text:
             raise InputError(f"-p {text}: write it as NAME=VALUE")
-    pairs = (text.partition("=") for text in texts)
-    return {name.strip(): value.strip() for name, _, value in pairs}
+    pairs = [(name.strip(), value.strip()) for name, _, value in (text.partition("=") for text in texts)]
+    names = [name for name, _ in pairs]
+    if twice := [name for name in names if names.count(name) > 1]:
+        raise InputError(f"-p {twice[0]}: it is given {names.count(twice[0])} times; give it once")
+    return dict(pairs)
 
 
 def with_entries(tree: dict[str, Any], given: Mapping[str, str]) -> dict[str, Any]:
@@ -53,9 +56,7 @@ def with_entries(tree: dict[str, Any], given: Mapping[str, str]) -> dict[str, An
     places = places_of(tree) if given else {}
     for name, text in given.items():
         if name not in places:
-            close = get_close_matches(name, places, 1)
-            hint = f"did you mean {close[0]!r}?" if close else f"there are: {', '.join(places)}"
-            raise InputError(f"there is no entry {name!r}; {hint}")
+            raise InputError(f"there is no entry {name!r}; {choice(name, places)}")
         tree = changed(tree, places[name], value_of(text))
     return tree
 

@@ -179,7 +179,8 @@ def _locked(path: Path, part: Path) -> int:
     import fcntl
 
     while True:
-        lock = _open_ordinary(part)
+        check_output(part)
+        lock = os.open(part, _OPENED, 0o666)
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
@@ -190,15 +191,6 @@ def _locked(path: Path, part: Path) -> int:
         if _is_at(lock, part):
             return lock
         os.close(lock)
-
-
-def _open_ordinary(part: Path) -> int:
-    check_output(part)
-    lock = os.open(part, _OPENED, 0o666)
-    if not stat.S_ISREG(os.fstat(lock).st_mode):
-        os.close(lock)
-        raise InputError(f"{part} is no ordinary file; remove it, or choose another output")
-    return lock
 
 
 def _is_at(opened: int, path: Path) -> bool:

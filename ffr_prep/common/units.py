@@ -62,15 +62,45 @@ _UNITS: dict[str, tuple[float, tuple[int, int, int, int]]] = {
 _SCALES = {"n": 1e-9, "u": 1e-6, "µ": 1e-6, "m": 1e-3, "c": 1e-2, "d": 1e-1, "k": 1e3, "M": 1e6, "G": 1e9}
 _TAKES_SCALE = ("m", "g", "s", "N", "J", "W", "Pa", "Hz", "rad")
 _QUANTITY = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?+)\s*([A-Za-zµ].*?)\s*")  # "1e3*t" is none
+_IN_FORMULAS = re.compile(r"[+()]|(?<!\^)-|\*\*|[*/]\s*[\d.]")
+_APART = re.compile(r"\*|\s/|/\s")
+_WORDS = re.compile(r"[A-Za-zµ]+")
 _FACTOR = re.compile(r"([*/ ]?)\s*([A-Za-zµ]+|1)(?:\^(-?\d+))?\s*")
 
 Dimension = tuple[int, int, int, int]
+_PURE: Dimension = (0, 0, 0, 0)
 
 
 def split_quantity(text: str) -> tuple[float, str] | None:
-    """(3.0, "mm") of "3 mm"; None for a text of another form."""
+    """(3.0, "mm") of "3 mm"; None for a text of another form, such as the formula "3 mm * x"."""
     found = _QUANTITY.fullmatch(text)
-    return None if found is None else (float(found[1]), found[2])
+    if found is None or _IN_FORMULAS.search(found[2]):
+        return None
+    words = _WORDS.findall(found[2])
+    divides = _APART.search(found[2]) is not None  # by a parameter, where a word is no unit
+    return None if divides and not all(map(is_unit, words)) else (float(found[1]), found[2])
+
+
+def is_unit(word: str) -> bool:
+    """Whether a word is a unit, such as mm."""
+    return word in _UNITS or (word[0] in _SCALES and word[1:] in _TAKES_SCALE)
+
+
+def dimension_of(unit: str) -> Dimension:
+    """The powers of kg, m, s and rad in a unit. Raises InputError as `to_si`."""
+    return _parsed(unit)[1]
+
+
+def in_words(dimension: Dimension) -> str:
+    """A dimension as a unit, N where it is one: "kg m/s"."""
+    known = {of: name for name, (size, of) in reversed(_UNITS.items()) if size == 1.0}
+    if dimension in known:
+        return known[dimension] if dimension != _PURE else "a pure number"
+    powers = [(name, power) for name, power in zip(("kg", "m", "s", "rad"), dimension, strict=True) if power]
+    above, below = (
+        [f"{name}^{abs(p)}" if abs(p) > 1 else name for name, p in powers if p * sign > 0] for sign in (1, -1)
+    )
+    return "/".join([" ".join(above) or "1", *below])
 
 
 def to_si(value: float, unit: str, expected: str | None = None) -> float:

@@ -93,7 +93,7 @@ def export_body(body: FlexibleBody, path: Path, surface: bool, settings: Mapping
     """
     entry = _format_of(path)
     if entry.write is None:
-        raise InputError(f"{path}: {entry.name} can be read only")
+        raise InputError(f"{path}: {entry.name} can be read only; {_suffixes('write')} can be written")
     given = arguments(entry, settings)
     loaded(entry.write)(body, path, surface=surface, **given)
     return () if entry.left_out is None else tuple(loaded(entry.left_out)(body, **given))
@@ -113,10 +113,14 @@ def import_body(path: Path, *, units: str = "m-kg-s") -> FlexibleBody:
         raise InputError(f"units {units!r} are not known; they are {', '.join(UNIT_SYSTEMS)}")
     entry = _format_of(path)
     if entry.read is None:
-        raise InputError(f"{path}: {entry.name} can be written only")
+        raise InputError(f"{path}: {entry.name} can be written only; {_suffixes('read')} can be read")
     with reading(path, f"a file of {entry.name}"):
         body: FlexibleBody = loaded(entry.read)(path)
     return large_in_words(in_si_units(body, UNIT_SYSTEMS[units]), units)
+
+
+def _suffixes(way: str) -> str:
+    return ", ".join(of for entry in EXCHANGE_FORMATS if getattr(entry, way) is not None for of in entry.suffixes)
 
 
 def _format_of(path: Path) -> ExchangeFormat:

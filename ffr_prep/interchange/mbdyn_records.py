@@ -89,7 +89,10 @@ def _header(found: Mapping[int, Record]) -> Header:
     count, *modes, rejected = (whole(word, f"line {line}: record 1") for word in words[1:])
     n = sum(modes) - rejected
     if n < 0 or count < 1:
-        raise InputError(f"line {line}: record 1 announces {count} nodes and {n} modes; that cannot be")
+        raise InputError(
+            f"line {line}: record 1 announces {count} nodes and {n} modes; there is at least "
+            "one node, and no mode is rejected that is not there"
+        )
     labels = tuple(word for _, word in _words(_without_comments(found[2])))
     if len(labels) != count:
         raise InputError(f"record 2 ends at line {found[2].end} with {len(labels)} labels; record 1 announces {count}")

@@ -56,7 +56,7 @@ def from_abaqus_matrices(stiffness: Path, mass: Path, *last: Path) -> MatrixMode
 def _entries(path: Path) -> Array:
     """(E, 3 or 5) the lines as numbers."""
     try:
-        with open(path, encoding="latin-1") as stream:
+        with open(path, encoding="utf-8-sig", errors="replace") as stream:
             lines = _lines(stream)
             first = next(lines, "")
             entries = np.loadtxt(chain([first], lines), ndmin=2) if first else np.zeros((0, 0))

@@ -83,7 +83,8 @@ def _check_mass(model: MatrixModel) -> None:
     coupled = np.flatnonzero(massless & (np.asarray(abs(model.M).sum(axis=1)).ravel() > 0))
     if coupled.size:
         raise InputError(
-            f"M is not positive: {row_in_words(model, coupled[0])} has no mass of its own, but is coupled to others"
+            f"M is not positive: {row_in_words(model, coupled[0])} has no mass of its own, but is coupled to others: give it "
+            "mass, or leave the coupling out"
         )
     if not massless.all() and not _is_positive(model, _DEFINITE):
         raise InputError(

@@ -80,7 +80,7 @@ def _matrix(path: Path) -> sp.csr_array:
     if path.suffix.lower() == ".npz":
         return sparse_of(str(path), arrays_of(path))
     try:
-        with open(path, encoding="latin-1") as stream:
+        with open(path, encoding="utf-8-sig", errors="replace") as stream:
             return _read(stream)
     except (ValueError, IndexError) as error:
         raise InputError(f"{path} is not a Matrix Market file of real numbers ({error})") from None

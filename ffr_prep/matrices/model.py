@@ -160,7 +160,10 @@ def without_empty_rows(model: MatrixModel) -> MatrixModel:
     groups = {name: new[of][new[of] >= 0] for name, of in model.groups.items()}
     if model.triangles is not None and (new[model.triangles] < 0).any():
         lost = int(model.triangles[new[model.triangles] < 0][0])
-        raise InputError(f"the surface has {node_in_words(model, lost)}, which has no row in the matrices")
+        raise InputError(
+            f"the surface has {node_in_words(model, lost)}, which has no row in the matrices: leave its triangles out, or "
+            "give the matrices of all its nodes"
+        )
     return MatrixModel(
         points=model.points[used],
         K=sp.csr_array(model.K[kept][:, kept]),
@@ -260,9 +263,9 @@ def _check_shapes(model: MatrixModel) -> None:
             )
         if not np.isfinite(A.data).all():
             raise InputError(f"{name} holds values that are not finite numbers")
-    if not np.isfinite(model.points).all():
-        wrong = int(np.flatnonzero(~np.isfinite(model.points).all(axis=1))[0])
-        raise InputError(f"node {model.labels[wrong]} has coordinates that are not finite numbers")
+    if not np.abs(model.points).max(initial=0.0) < _FAR:
+        wrong = int(np.flatnonzero(~(np.abs(model.points) < _FAR).all(axis=1))[0])
+        raise InputError(f"node {model.labels[wrong]} has coordinates that are not finite numbers, below {_FAR:g} m")
     if model.labels.shape != (len(model.points),):
         raise InputError(f"there are {len(model.points)} nodes, but {np.size(model.labels)} labels for them")
 

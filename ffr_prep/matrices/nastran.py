@@ -139,7 +139,7 @@ def grids_of_op2(path: Path, results: Any) -> GridTable:
     if columns.shape[1] >= 3 and columns[:, 1].any():
         raise InputError(f"{path} has its points in local coordinates only (GPDT); write BGPDT, or give the bulk data")
     if len(xyz) != len(numbers.nid):
-        raise InputError(f"{path}: EQEXIN has {len(numbers.nid)} points, BGPDT {len(xyz)}")
+        raise InputError(f"{path}: EQEXIN has {len(numbers.nid)} points, BGPDT {len(xyz)}: write one model to a file")
     order = np.argsort(np.asarray(numbers.dof), kind="stable")
     return GridTable(
         labels=np.asarray(numbers.nid, np.int64)[order],

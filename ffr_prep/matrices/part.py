@@ -136,4 +136,4 @@ def _doubts(defect: Array) -> list[str]:
 
 
 def _unstressed(*fields: Array) -> NoReturn:
-    raise InputError("load matrices need stresses, which matrices from outside do not give: the body is linear")
+    raise InputError("load matrices need stresses, which matrices from outside do not give: reduce with linear=True")

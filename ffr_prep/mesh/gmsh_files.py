@@ -143,6 +143,10 @@ def _arrays(
         job_file, result = Path(folder, "job.json"), Path(folder, "result.npz")
         job_file.write_text(json.dumps(job | {"path": str(_alone(path, Path(folder)))}))
         _run_gmsh(path, job_file, result)
+        if not result.exists():
+            raise InputError(
+                f"gmsh ended before {path} was a mesh: take Exit, and what else ends it, out of the script"
+            )
         with np.load(result) as stored:
             return dict(stored), declared or unit
 

@@ -175,7 +175,9 @@ def _check_places(path: Path, read: FileMesh) -> None:
         if nodes.size and not 0 <= nodes.min() <= nodes.max() < len(read.points):
             raise InputError(f"{path} refers to nodes that it does not define; is it complete?")
     if not np.abs(read.points).max(initial=0.0) < _FAR:
-        raise InputError(f"{path} has nodes without a place: their coordinates are no finite numbers")
+        raise InputError(
+            f"{path} has nodes without a place: coordinates are finite numbers, below {_FAR:g}; is it complete?"
+        )
 
 
 def _in_metres(read: FileMesh, unit: str) -> Mesh:

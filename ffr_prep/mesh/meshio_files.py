@@ -28,7 +28,7 @@ def from_meshio(path: Path) -> FileMesh:
     read = _read(path)
     volumes = [k for k, block in enumerate(read.cells) if block.dim == 3]
     faces = [k for k, block in enumerate(read.cells) if block.type in _FACES]
-    groups = dict(_cell_sets(path, read)) | dict(_tagged_cells(read))
+    groups = dict(_cell_sets(read)) | dict(_tagged_cells(read))
     return FileMesh(
         points=_in_space(path, read.points),
         blocks=tuple((_kind(read.cells[k].type), np.asarray(read.cells[k].data, np.int64)) for k in volumes),
@@ -70,14 +70,11 @@ def _ignored(read: meshio.Mesh) -> Iterator[str]:
 # ---- groups -------------------------------------------------------------------------------------------------------
 
 
-def _cell_sets(path: Path, read: meshio.Mesh) -> Iterator[tuple[str, Sequence[Array]]]:
+def _cell_sets(read: meshio.Mesh) -> Iterator[tuple[str, Sequence[Array]]]:
     """Named sets of cells: for each block the indices within it."""
     for name, members in read.cell_sets.items():
-        if name.startswith("gmsh:"):
-            continue
-        if len(members) != len(read.cells):
-            raise InputError(f"{path}: the element set {name!r} cannot be resolved; list its elements by number")
-        yield name, [np.asarray([] if of is None else of, np.int64) for of in members]
+        if not name.startswith("gmsh:"):
+            yield name, [np.asarray([] if of is None else of, np.int64) for of in members]
 
 
 def _tagged_cells(read: meshio.Mesh) -> Iterator[tuple[str, Sequence[Array]]]:

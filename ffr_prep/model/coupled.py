@@ -64,8 +64,8 @@ class CoupledModel(Brief):
     places  : (Z, 3) where each coordinate is [m]; NaN for those of rigid interfaces, which are in many places
     names, kinds, positions (I, 3) [m] : of the I interfaces
     C       : (6I, Z) interface coordinates C z: three translations [m] and three rotations [rad] of each interface
-    inertial_loads : (Z, 12) loads of unit accelerations: translation, rotation, products of the angular velocity; None where
-              the model does not know them
+    inertial_loads : (Z, 12) loads of unit accelerations: translation, rotation, products of the angular velocity; None of
+              a reduced body that is converted
     edges     : (E, 2) nodes at the ends of each edge of each element; None where the model does not know its elements
     dimension : of the elements: 3 of solids, 2 of plates, 1 of beams
     """

@@ -130,6 +130,9 @@ def divided(
     Raises InputError for planes that leave a part without elements or in several pieces, for parts that do not follow one
     another, and for interfaces called like those of a cut.
     """
+    count = sum(map(len, blocks))
+    if isinstance(cuts, int) and cuts > count:
+        raise InputError(f"parts = {cuts}: the model has {count} elements, and each part one at least; ask for fewer")
     planes = planes_of(cuts, points)
     centres = np.concatenate([points[nodes].mean(axis=1) for nodes in blocks])
     beyond = [(centres - plane.point) @ np.asarray(plane.normal) > 0 for plane in planes]
@@ -193,9 +196,6 @@ def _check(division: Division) -> None:
     for k, l in combinations(range(len(division.nodes)), 2):  # noqa: E741
         if l > k + 1 and np.intersect1d(division.nodes[k], division.nodes[l]).size:
             raise InputError(f"parts {k + 1} and {l + 1} touch each other: cut into fewer parts, or with other planes")
-    for k, (one, other) in enumerate(pairwise(division.shared), 2):
-        if np.intersect1d(one, other).size:
-            raise InputError(f"part {k} is so short that its two cuts share nodes: cut into fewer parts")
 
 
 # ---- interfaces ---------------------------------------------------------------------------------------------------

@@ -14,16 +14,19 @@ import scipy.sparse as sp
 
 from ffr_prep.body.accelerations import INERTIAL
 from ffr_prep.common.arrays import Array
-from ffr_prep.common.errors import ComputationError
 from ffr_prep.model.coupled import CoupledModel
 from ffr_prep.model.reference import ReferenceConditions, UserConditions
 
 
 def known_loads(model: CoupledModel) -> Array:
-    """(Z, 12 + 6 I) the loads; ComputationError for a model that does not know its inertial loads."""
-    if model.inertial_loads is None:
-        raise ComputationError("the model does not know its inertial loads: it cannot be stiffened or tied")
-    return np.hstack([model.inertial_loads, model.C.toarray().T])
+    """(Z, 12 + 6 I) the loads."""
+    return np.hstack([inertial_loads(model), model.C.toarray().T])
+
+
+def inertial_loads(model: CoupledModel) -> Array:
+    """(Z, 12) loads of unit accelerations, which only the model of a reduced body does not know; nobody loads that one."""
+    assert model.inertial_loads is not None
+    return model.inertial_loads
 
 
 def supports(model: CoupledModel, conditions: ReferenceConditions) -> Array:

@@ -59,15 +59,22 @@ def file_materials(path: str | Path, mesh: Mesh, *, unit: str | None = None) -> 
     """
     path = Path(path)
     with reading(path, "a mesh with materials"):
-        found, of_group = _read(path)
-        groups = {name.upper(): name for name in mesh.volume_groups}
-        used = {groups[key]: found[name] for key, name in of_group.items() if key in groups and name in found}
-        if not used:
-            raise InputError(
-                f"{path} has no material for its elements; give --material (in Python the material of from_mesh)"
-            )
-        system = _SYSTEMS[unit_system(path, list(used.values()), unit)]
-        return {group: _solid(path, one, system) for group, one in used.items()}
+        try:
+            return _materials(path, mesh, unit)
+        except InputError as error:
+            raise InputError(str(error) if str(path) in str(error) else f"{path}: {error}") from None
+
+
+def _materials(path: Path, mesh: Mesh, unit: str | None) -> dict[str, Solid]:
+    found, of_group = _read(path)
+    groups = {name.upper(): name for name in mesh.volume_groups}
+    used = {groups[key]: found[name] for key, name in of_group.items() if key in groups and name in found}
+    if not used:
+        raise InputError(
+            f"{path} has no material for its elements; give --material (in Python the material of from_mesh)"
+        )
+    system = _SYSTEMS[unit_system(path, list(used.values()), unit)]
+    return {group: _solid(path, one, system) for group, one in used.items()}
 
 
 def names_of_materials(path: Path) -> list[str]:
@@ -184,7 +191,9 @@ def _numbers(rows: list[list[str]]) -> list[float]:
     try:
         return [float(re.sub("[dD]", "e", word)) for row in rows for word in row if word]
     except ValueError as error:
-        raise InputError(f"a material has a constant that is no number ({error})") from None
+        raise InputError(
+            f"a material has a constant that is no number ({error}); correct it, or give --material"
+        ) from None
 
 
 def _of_nastran(path: Path) -> tuple[dict[str, _Constants], dict[str, str]]:

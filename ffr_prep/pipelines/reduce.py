@@ -199,7 +199,10 @@ def _basis(reduction: Reduction, coupled: CoupledModel, body: FreeBody, L: Array
     try:
         return reduction.basis(coupled, body, L)
     except np.linalg.LinAlgError as error:
-        raise ComputationError(f"the eigenproblem of K and M failed ({error}): is M nearly singular?") from None
+        raise ComputationError(
+            f"the eigenproblem of K and M failed ({error}): M is nearly singular; give "
+            "masses to the nodes that have none, or ask for fewer modes"
+        ) from None
 
 
 def _shifted_basis(reduction: Reduction, coupled: CoupledModel, body: FreeBody, L: Array) -> Basis:

@@ -197,15 +197,21 @@ def check_basis(model: CoupledModel, L: Array, basis: Basis) -> None:
     _check_small("Z^T K Z - diag(omega2)", Z.T @ (model.K @ Z) - np.diag(omega2), allowed)
     _check_small("L Z", L @ Z, 1e-8 * np.abs(Z).max(initial=0.0))
     if omega2.size and not omega2[0] > 0:
-        raise ComputationError(f"the lowest squared frequency is {omega2[0]:.3g} rad^2/s^2: a rigid motion is left")
+        raise ComputationError(
+            f"the lowest squared frequency is {omega2[0]:.3g} rad^2/s^2: a rigid motion is left; choose reference "
+            "conditions that hold the body"
+        )
     if _rigid_content(model, Z).max(initial=0.0) > 1 - _RIGID:
-        raise ComputationError("a mode of the basis is a rigid motion: the reference conditions do not hold the body")
+        raise ComputationError("a mode of the basis is a rigid motion: choose reference conditions that hold the body")
 
 
 def _check_small(name: str, value: Array, allowed: float) -> None:
     worst = np.abs(value).max(initial=0.0)
     if not worst <= allowed:
-        raise ComputationError(f"the basis is inaccurate: {name} reaches {worst:.1e}, allowed {allowed:.1e}")
+        raise ComputationError(
+            f"the basis is inaccurate: {name} reaches {worst:.1e}, allowed {allowed:.1e}; ask for fewer modes, or for "
+            "another solver"
+        )
 
 
 def _rigid_content(model: CoupledModel, Z: Array) -> Array:

@@ -20,6 +20,7 @@ import numpy as np
 
 from ffr_prep.common.arrays import Array
 from ffr_prep.model.coupled import CoupledModel
+from ffr_prep.model.reactions import inertial_loads
 from ffr_prep.reduction.basis import Basis, in_frame
 from ffr_prep.reduction.mesh_resolution import resolution_warnings
 from ffr_prep.reduction.modes import modes_up_to
@@ -31,7 +32,7 @@ from ffr_prep.reduction.receptance import (
     reference_modes,
     static_flexibility,
 )
-from ffr_prep.reduction.responses import inertial_loads, mean_motion, static_solver
+from ffr_prep.reduction.responses import mean_motion, static_solver
 from ffr_prep.reduction.selection import Band
 from ffr_prep.solvers.factor import FreeBody, supported
 
@@ -85,8 +86,7 @@ class Quality:
 def assess(model: CoupledModel, body: FreeBody, L: Array, basis: Basis, band: Band) -> Quality:
     """Compare the basis with the full model up to the upper end of the band.
 
-    Raises InputError for a model that does not know its inertial loads, ComputationError when the full model's
-    receptances cannot be found accurately.
+    Raises ComputationError when the full model's receptances cannot be found accurately.
     """
     exact, omega2, shapes = _frequencies(model, body, L, band)
     errors = _frequency_errors(exact, basis)

@@ -14,7 +14,6 @@ from collections.abc import Callable
 import numpy as np
 
 from ffr_prep.common.arrays import Array
-from ffr_prep.common.errors import InputError
 from ffr_prep.model.coupled import CoupledModel
 from ffr_prep.solvers.factor import FreeBody, solve_refined, supported
 
@@ -45,13 +44,6 @@ def free_supports(model: CoupledModel, L: Array) -> Array:
 def attachment_modes(model: CoupledModel, body: FreeBody, L: Array) -> Array:
     """(Z, 6I) static response to unit interface loads."""
     return static_response(model, body, free_supports(model, L), model.C.toarray().T)
-
-
-def inertial_loads(model: CoupledModel) -> Array:
-    """(Z, 12) loads of unit accelerations; InputError for a model that does not know them."""
-    if model.inertial_loads is None:
-        raise InputError("this model does not know its inertial loads: leave out inertia relief and the quality report")
-    return model.inertial_loads
 
 
 def static_response(model: CoupledModel, body: FreeBody, supports: Array, loads: Array) -> Array:

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.sparse.csgraph import connected_components
 
 from ffr_prep.body.accelerations import INERTIAL
 from ffr_prep.common.arrays import Array
@@ -26,7 +25,7 @@ def couple(mesh: Mesh, matrices: SolidMatrices, interfaces: Sequence[InterfaceRe
     """Tie the interfaces to the mesh.
 
     Raises InputError for repeated names, an unknown region, a region of fewer than three or of collinear nodes,
-    rigid regions that share nodes, interfaces whose coordinates depend on one another, and a mesh in several parts.
+    rigid regions that share nodes, and interfaces whose coordinates depend on one another.
     """
     check_names(interfaces)
     regions = [_region(mesh, interface) for interface in interfaces]
@@ -35,13 +34,11 @@ def couple(mesh: Mesh, matrices: SolidMatrices, interfaces: Sequence[InterfaceRe
     C = interface_coordinates(list(map(_follows, regions)), B, lambda k: _on_nodes(len(mesh.points), regions[k]))
     check_independent(interfaces, C)
     free = np.flatnonzero(np.repeat(_free_nodes(mesh.points, regions), 3))
-    K = _tied(matrices.K, B, free)
-    _check_connected(K)
     centre = mesh.points.mean(axis=0)
     return CoupledModel(
         points=mesh.points,
         B=B,
-        K=K,
+        K=_tied(matrices.K, B, free),
         M=_tied(vector_mass(matrices.m), B, free),
         T=_rigid_motions(mesh.points, centre, regions),
         centre=centre,
@@ -230,14 +227,3 @@ def _check_overlaps(regions: Sequence[_Region]) -> None:
                     f"(node {shared[0]} is the first): a node cannot follow two of them; make one 'mean' or separate "
                     "the regions"
                 )
-
-
-def _check_connected(K: sp.csr_array) -> None:
-    parts, labels = connected_components(K, connection="strong")  # without a transpose, which K is itself
-    if parts > 1:
-        sizes = np.sort(np.bincount(labels))[::-1]
-        listed = ", ".join(str(size) for size in sizes[:5])
-        raise InputError(
-            f"the mesh falls into {parts} parts that nothing connects ({listed}{', ...' if parts > 5 else ''} degrees "
-            "of freedom): merge the coincident nodes, join the parts with a rigid interface, or reduce them one by one"
-        )

@@ -32,7 +32,7 @@ def region_triangles(mesh: Mesh, body: FlexibleBody, region: str) -> Array:
     facets = face_group(with_regions(mesh, [region]), region)
     corners = np.concatenate([np.zeros((0, 3), np.int64), *_outer_triangles(mesh, facets)])
     if not len(corners):
-        raise InputError(f"region {region!r} is nowhere on the outside of the body")
+        raise InputError(f"region {region!r} is nowhere on the outside of the body; choose faces that are")
     if body.surface is None:
         raise InputError(f"body {body.name!r} has no surface")
     tree = cKDTree(body.surface.points[body.surface.triangles].mean(axis=1))

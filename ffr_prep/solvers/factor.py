@@ -293,7 +293,8 @@ def supported(body: FreeBody, C: Array) -> SupportedBody:
     condition = np.linalg.cond(scaled)
     if not condition < 1e13:
         raise ComputationError(
-            f"the {len(C)} supports depend on one another or leave a rigid motion free (condition {condition:.1e})"
+            f"the {len(C)} supports depend on one another or leave a rigid motion free (condition {condition:.1e}): "
+            "choose other reference conditions or interfaces"
         )
     return SupportedBody(body, C, flexibility, scale, scipy.linalg.lu_factor(scaled))
 

@@ -95,4 +95,7 @@ def _counted(count: Callable[[float], int], below: float) -> tuple[int, float]:
             return count(below), below
         except np.linalg.LinAlgError:
             below *= 1 - 0.1 * _APART * (trial + 1)
-    raise ComputationError(f"the modes below {_hertz(below):.6g} Hz cannot be counted: K - omega2 M stays singular")
+    raise ComputationError(
+        f"the modes below {_hertz(below):.6g} Hz cannot be counted: K - omega2 M stays singular; "
+        "ask for one mode more or less"
+    )

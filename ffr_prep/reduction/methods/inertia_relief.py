@@ -10,8 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ffr_prep.model.coupled import CoupledModel
+from ffr_prep.model.reactions import inertial_loads
 from ffr_prep.reduction.basis import Basis, basis_of
-from ffr_prep.reduction.responses import inertial_loads, static_response
+from ffr_prep.reduction.responses import static_response
 from ffr_prep.solvers.factor import FreeBody
 
 
@@ -27,6 +28,6 @@ class InertiaRelief:
     """
 
     def basis(self, model: CoupledModel, body: FreeBody, L: np.ndarray) -> Basis:
-        """Raises InputError for a model that does not know its inertial loads."""
+        """The responses as a basis."""
         held = L if len(L) > 6 or not model.names else model.C.toarray()
         return basis_of(model, L, static_response(model, body, held, inertial_loads(model)))

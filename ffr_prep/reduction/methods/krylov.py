@@ -80,7 +80,10 @@ def dynamic_solver(model: CoupledModel, frequency: float) -> Callable[[Array], A
     try:
         factor: Any = scipy.sparse.linalg.splu(A)  # indefinite, so with pivoting
     except RuntimeError as error:
-        raise ComputationError(f"at {frequency:g} Hz the vibration has no finite amplitude ({error})") from None
+        raise ComputationError(
+            f"at {frequency:g} Hz the vibration has no finite amplitude ({error}): it is a natural frequency of the body; "
+            "choose another"
+        ) from None
 
     def solve(loads: Array) -> Array:
         response = factor.solve(loads)

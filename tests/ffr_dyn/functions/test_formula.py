@@ -9,6 +9,7 @@ import pytest
 
 from ffr_dyn.functions import operations
 from ffr_dyn.functions.formula import TIME, Measured, formula, names_in, number, parse, text_of, value_of
+from ffr_dyn.functions.quantities import with_unit
 from ffr_dyn.functions.time_functions import evaluate, operation, table
 from ffr_prep.common.errors import InputError
 
@@ -107,7 +108,7 @@ def test_measured_quantities_are_named_and_filled_in():
         ("lambda: 1", ["is not allowed"]),
         ("'a' * 3", ["'a'", "is not allowed"]),
         ("True", ["is not allowed"]),
-        ("1j", ["is not allowed"]),
+        ("1j", ["unknown unit 'j'"]),
         ("t.real.imag(3)", ["not a known function"]),
         ("sin(t, t)", ["1 argument"]),
         ("min(t)", ["2 arguments"]),
@@ -147,3 +148,63 @@ def test_a_table_in_a_formula_has_no_text():
     assert evaluate(whole, 1.0)[0] == pytest.approx(2.0)
     with pytest.raises(InputError, match="table"):
         text_of(whole)
+
+
+# ---- numbers with units -----------------------------------------------------------------------------------------------
+
+GIVEN = {"mass": 2.0, "m": 3.0, **{name: with_unit(*of) for name, of in {
+    "speed": (100, "rpm"), "f": (12, "Hz"), "length": (200, "mm")}.items()}}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "at_one"),
+    [
+        ("2*pi/3 + 100 rpm*t", "rad", 2 * np.pi / 3 + 100 * np.pi / 30),
+        ("30 deg + 2 rev/s * t", "rad", np.pi / 6 + 4 * np.pi),
+        ("3 kg * 9.81 m/s^2", "N", 29.43),
+        ("0.1 m * sin(2*pi*f*t + 90 deg)", "m", 0.1),
+        ("0.1 m * 100 rpm", "m/s", np.pi / 3),
+        ("3 N * smooth(t/2 s)", "N", 1.5),
+        ("3 N / length + 5", "N/m", 20.0),
+        ("3 N / m", "N", 1.0),
+        ("-(5 kN m^2 - 2 N m^2)/2 m", "N m", -2499.0),
+        ("max(3 N, 2e3 mN) + mass", "N", 5.0),
+        ("sqrt(4 m^2)", "m", 2.0),
+        ("speed*t", "rad", 100 * np.pi / 30),
+        ("(3 mm)**2", "m^2", 9e-6),
+    ],
+)
+def test_numbers_in_formulas_have_units(text, unit, at_one):
+    assert evaluate(formula(text, GIVEN, unit=unit), 1.0)[0] == pytest.approx(at_one, rel=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "says"),
+    [
+        ("2*pi/3 + 100 rpm*t", "m", "comes to rad, and is given in m"),
+        ("3 kg * t", "N", "comes to kg s, and is given in N"),
+        ("3 kg * 9.81", "N or N m", "comes to kg, and is given in N or N m: give all its numbers their units, or none"),
+        ("20 mm * t/2 s", "kg", "comes to m"),
+        ("5 mm + 3 kg", None, "adds m and kg"),
+        ("max(3 N, 2 kg)", None, "adds N and kg"),
+        ("exp(3 m)", None, "exp is of a pure number or an angle, and is given m"),
+        ("0.1 m * sin(3 Hz * t)", "m", "Hz counts turns"),
+        ("2 Hz * t", "rad", "write 2 \\* pi before it"),
+        ("1 + 3 N/m", "N", "comes to kg/s\\^2, and is given in N"),
+        ("100 N/mmm * t", "N", "unknown unit 'mmm'"),
+        ("2 newton * t", "N", "unknown unit 'newton'"),
+        ("3 N*mm + 2 N", "N", "'mm' is not known; if it is a unit, write it behind its number"),
+        ("3 m (2)", None, "calls '3 m'"),
+    ],
+)
+def test_units_that_do_not_fit_are_refused(text, unit, says):
+    with pytest.raises(InputError, match=says):
+        formula(text, GIVEN, unit=unit)
+
+
+def test_of_parameters_and_of_what_is_measured_nothing_is_known():
+    formula("10 * length * smooth(t / 0.1 s)", GIVEN, unit="N")
+    parse("-3 N s/m * slider.pin.velocity.x", GIVEN, "it", "N")
+    parse("3 kg * slider.pin.velocity.x", GIVEN, "it", "N")
+    with pytest.raises(InputError, match="adds N and kg"):
+        parse("3 N + 2 kg - slider.pin.velocity.x", GIVEN, "it", "N")

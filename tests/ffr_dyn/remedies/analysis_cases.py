@@ -277,7 +277,13 @@ def far_off(tolerance: float) -> Result:
 
 
 TUMBLING = Scene((Body("bar", bar("bar"), omega_bar=(300.0, 1e3, 0)),), plane="none")
-HUGE = replace(HINGED, bodies=(replace(HINGED.bodies[0], omega_bar=(0, 0, 1e200)),), plane="none")
+
+
+def turned(speed: float) -> Scene:
+    return replace(HINGED, drivers=(fd.Driver("d", "hinge", fd.polynomial(0.0, speed)),))
+
+
+HUGE = replace(HINGED, bodies=(replace(HINGED.bodies[0], omega_bar=(0, 0, 9e59)),), plane="none")
 APART = tuple((cloud(3).interface("b").position - cloud(3).interface("a").position).tolist())
 SPACE = replace(CLOUD, plane="none")
 
@@ -317,6 +323,8 @@ OTHER = [
     Case(p(cut, 0.9, end=1.0, output_step=0.1), p(cut, 1e-6, end=0.01)),
     Case(p(loose, 0.9), p(loose, 1e-3)),
     Case(p(run, HUGE), p(run, HINGED)),
+    Case(p(run, turned(1e200)), p(run, turned(1.0))),
+    Case(p(run, HUGE, fd.AdaptiveROS3()), p(run, HINGED, fd.AdaptiveROS3())),
     Case(p(damped, HalfExplicit(1e-3)), p(damped, ROS2(1e-3))),
     Case(p(tumbled, 1e-3), p(tumbled, 1e-8)),
     Case(lambda: run(locking(), RK4(1e-3), 0.5, stabilisation=Drifting()), lambda: run(locking(), RK4(1e-3))),

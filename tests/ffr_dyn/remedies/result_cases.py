@@ -47,6 +47,11 @@ def read(change: Callable[[Path], object]) -> Result:
         return load_result(path)
 
 
+def piped(path: Path) -> None:
+    path.unlink()
+    os.mkfifo(path)
+
+
 def marked(**attributes: object) -> Callable[[Path], None]:
     def change(path: Path) -> None:
         with h5py.File(path, "r+", locking=False) as file:
@@ -75,6 +80,7 @@ def no_space(*_: object) -> None:
 
 ROW = {"a": np.zeros((1, 3))}
 FILES = [
+    Case(p(read, piped), p(read, lambda path: None)),
     Case(p(read, lambda path: path.write_bytes(path.read_bytes()[:100])), p(read, lambda path: save_result(ROWS, path))),
     Case(p(read, marked(ffr_format="else")), p(read, lambda path: save_result(ROWS, path))),
     Case(p(read, marked(ffr_format_version=99)), p(read, marked())),

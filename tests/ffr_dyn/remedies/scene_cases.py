@@ -32,7 +32,7 @@ from ffr_dyn.scene.parts import as_declared
 from ffr_dyn.scene.scene import Body, Scene
 from ffr_dyn.scene_file.write import to_toml
 from ffr_dyn.variants.variant import vary
-from ffr_prep.body import FlexibleBody
+from ffr_prep.body import FlexibleBody, rigid_body
 from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.reference import FixedTo
 from ffr_prep.pipelines.reduce import Request, reduce
@@ -76,6 +76,15 @@ def older(*, stiffening: bool) -> object:
     return assemble(Scene((body,), (joint,), ground={"O": (0, 0, 0)}, loads=(push,)))
 
 
+def placed(**how: object) -> object:
+    return run(replace(HINGED, bodies=(replace(HINGED.bodies[0], **how),)), end=0.01)
+
+
+def slim(inertia: float) -> object:
+    model = rigid_body("needle", mass=1.0, inertia=(inertia, 0.1, 0.1), points={"a": (0, 0, 0)})
+    return assemble(replace(HINGED, bodies=(Body("bar", model),), plane="none"))
+
+
 SIZE = len(cloud(2).surface.points)
 SCENES = [
     Case(p(run, replace(CLOUD, plane="z"), end=0.01), p(run, replace(CLOUD, plane="none"), end=0.01)),
@@ -89,6 +98,13 @@ SCENES = [
     Case(p(geared, np.pi), p(geared, 22 / 7)),
     Case(p(flat, "z"), p(flat, "none")),
     Case(p(older, stiffening=True), p(older, stiffening=False)),
+    *(Case(p(placed, **wrong), p(placed, rotation=(0, 0, 0.1))) for wrong in (
+        {"position": (1e200, 0, 0)}, {"velocity": (np.nan, 0, 0)}, {"omega_bar": (0, 0, 1e300)},
+        {"rotation": (1e300, 0, 0)}, {"rotation": (1e7, 0, 0)})),
+    Case(lambda: replace(HINGED, gravity=(0, 1e300, 0)), lambda: replace(HINGED, gravity=(0, -9.81, 0))),
+    Case(p(Coupling, "c", "hinge0.angle", "hinge0.angle", 2.0), p(geared, 2.0)),
+    Case(p(run, HINGED, end=1e9), p(run, HINGED, end=0.01)),
+    Case(p(slim, 0.0), p(slim, 0.1)),
 ]  # fmt: skip
 
 # ---- bodies in parts ----------------------------------------------------------------------------------------------------

@@ -21,7 +21,7 @@ from ffr_dyn.studies.measures import attribute
 from ffr_dyn.studies.plan import study
 from ffr_dyn.studies.sampling import Axis, Spread, points, spaced
 from ffr_dyn.studies.table import Journal, Table, load_table
-from ffr_dyn.studies.workers import crew
+from ffr_dyn.studies.workers import _refused, crew
 
 p = partial
 ANGLE = {"angle": "hinge.angle: last"}
@@ -92,13 +92,23 @@ NUMBERS = np.array([1.0, 2.0, 3.0])
 LINE = "reduce-structure d.toml --set d=${d}"
 SHORT, LONG = Axis((1, 2)), Axis((1, 2, 3))
 FULL = {name: spaced(0, 1, 1000) for name in "abcd"}
+
+
+def served(*files: str) -> None:
+    """What a worker of a study says of files of Python that it is to load."""
+    if (refused := _refused(files)) is not None:
+        raise refused
+
+
 CASES = [
+    Case(p(served, "nowhere.py"), served),
     Case(asked({}), asked(G)),
     Case(asked(G, {}), asked(G)),
     Case(asked({"g": []}), asked(G)),
     Case(asked({"g": {"from": 1, "to": 2, "count": 3, "spacing": "even"}}),
          asked({"g": {"from": 1, "to": 2, "count": 3, "spacing": "log"}})),
     Case(asked({"g": {"from": "a", "to": 2, "count": 3}}), asked({"g": {"from": 1, "to": 2, "count": 3}})),
+    *(Case(asked({"g": wrong}), asked(G)) for wrong in (np.nan, [1.0, np.inf], {"from": 1, "to": np.nan, "count": 3})),
     Case(asked({"g h": [1]}), asked(G)),
     Case(asked({"gg": [1]}), asked(G)),
     Case(asked({**G, "idle": [1]}), asked(G)),

@@ -11,7 +11,7 @@ from boxes import box_mesh, moved, rotation
 
 import ffr_prep as fp
 from ffr_prep.body import load_body, save_body
-from ffr_prep.common.errors import ComputationError, InputError
+from ffr_prep.common.errors import InputError
 from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.material import Material
 from ffr_prep.model.reference import FixedTo, MeanAxis
@@ -190,13 +190,6 @@ def test_ties_that_cannot_be_used(ties, says):
     parts = {"one": beam_half(0, 1, 2, left="a", right="b"), "two": beam_half(1, 1, 2, left="c", right="d")}
     with pytest.raises(InputError, match=says):
         tied(parts, ties)
-
-
-def test_a_part_must_know_its_inertial_loads():
-    part = beam_half(0, 1, 2, left="a", right="b")
-    without = replace(part, coupled=replace(part.coupled, inertial_loads=None))
-    with pytest.raises(ComputationError, match="does not know its inertial loads"):
-        tied({"one": without, "two": beam_half(1, 1, 2, left="c", right="d")}, [("one.b", "two.c")])
 
 
 def test_two_mean_interfaces_cannot_be_tied():

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+from unittest.mock import patch
 
+import h5py
 from mutated_inputs import STRUCTURE
 from prep_remedy import command, with_files, words
 from said import Case
 
+from ffr_prep.body import load_body
+from ffr_prep.common.hdf5 import check_heaps
 from ffr_prep.common.outputs import replacing
-from ffr_prep.common.reading import check_count, read_text, read_toml
+from ffr_prep.common.reading import check_count, read_text, read_toml, reading
 from ffr_prep.common.registry import Registry, Setting
 from ffr_prep.common.units import to_si
 
@@ -76,7 +80,7 @@ OPTIONS += [
     words("reduce-matrices K.mtx M.mtx --interface tip -o new.ffr", f"{MATRICES} --group tip=3"),
 ]
 
-# ---- plug-ins, units, files -----------------------------------------------------------------------------------------------
+# ---- plug-ins, units, files ------------------------------------------------------------------------------------------
 
 PLUGIN = "from ffr_prep import register_mesh_format, MeshFormat\n"
 
@@ -94,6 +98,16 @@ def registered(*settings: Setting, name: str = "other") -> object:
     return registry.register(Entry(name, settings))
 
 
+def piped(path: Path) -> object:
+    """A body that is a pipe, which nobody writes to."""
+
+    def act() -> object:
+        os.mkfifo(path)
+        return load_body(path)
+
+    return with_files(act, {})
+
+
 def linked(name: str) -> object:
     def act() -> object:
         os.symlink("block.inp", "link.ffr")
@@ -108,6 +122,66 @@ def linked(name: str) -> object:
 
 def toml(text: str, name: str = "a.toml") -> object:
     return with_files(lambda: read_toml(name, "a scene file"), {name: (("", text),)})
+
+
+def unwritable(line: str) -> object:
+    """A command in a folder that the user may not write to."""
+    with patch("os.access", lambda _, mode: mode != os.W_OK):
+        return command(line)
+
+
+def written(failing: bool = False, twice: bool = False) -> object:
+    def act() -> object:
+        with replacing("new.txt") as part:
+            part.write_text("new")
+            if failing:
+                raise OSError(28, "No space left on device")
+            if twice:
+                written_again()
+
+    return with_files(act, {})
+
+
+def written_again() -> None:
+    with replacing("new.txt"):
+        pass
+
+
+def read(content: bytes) -> object:
+    def act() -> object:
+        Path("a.txt").write_bytes(content)
+        return read_text("a.txt", "a deck")
+
+    return with_files(act, {})
+
+
+def reading_of(error: Exception | None = None) -> object:
+    """A file that a reader fails at."""
+
+    def act() -> object:
+        with reading("block.inp", "a deck", ValueError):
+            if error is not None:
+                raise error
+
+    return with_files(act, {})
+
+
+def heap(damage: bytes) -> object:
+    """The heap of texts of an HDF5 file, the first of which takes no room where it is damaged."""
+
+    def act() -> object:
+        with h5py.File("a.nc", "w") as file:
+            for k in range(60):
+                file.attrs[f"text {k}"] = "word " * 10
+        content = bytearray(Path("a.nc").read_bytes())
+        at = content.find(b"GCOL")
+        if damage:
+            content[at + 16 : at + 18] = damage
+            content[at + 24 : at + 32] = bytes(8)
+        Path("a.nc").write_bytes(content)
+        return check_heaps("a.nc")
+
+    return with_files(act, {})
 
 
 GOOD = "a = 1\n"
@@ -143,9 +217,28 @@ FILES = [
     words("import block.inp -o new.ffr", "import legacy.fem -o new.ffr"),
     words("export body.ffr -o new.xyz", "export body.ffr -o new.sid"),
     words("info body.ffr --terms I10", "info body.ffr --terms I1"),
+    reduces("--stiffening", "--linear"),
+    words("reduce block.inp --linear --interface LEFT -o -", REDUCE),
+    words("modes body.ffr -o block.inp/out", "info body.ffr"),
+    words(
+        "reduce-structure s.toml -o new.ffr -p nodes.tip.1=1 -p nodes.tip.1=1",
+        "reduce-structure s.toml -o new.ffr -p nodes.tip.1=1",
+        s_toml=STRUCTURE,
+    ),
+    words("mesh end.geo --size 1 --order 1", "mesh part.geo --size 1 --order 1", end_geo="Exit;\n"),
+    reduces("--parts 3", "--modes 0 --parts 2"),
+    Case(lambda: piped(Path("pipe.ffr")), lambda: with_files(lambda: load_body("body.ffr"), {})),
+    Case(lambda: unwritable(REDUCE), lambda: command(REDUCE)),
+    Case(lambda: written(failing=True), written),
+    Case(lambda: written(twice=True), written),
+    Case(lambda: read(b"\xff\xfeabc"), lambda: read("abc".encode("utf-16"))),
+    Case(lambda: reading_of(MemoryError()), reading_of),
+    Case(lambda: reading_of(KeyError("of no kind")), reading_of),
+    Case(lambda: reading_of(ValueError("no header")), reading_of),
+    Case(lambda: heap(bytes(2)), lambda: heap(b"")),
 ]
 
-# ---- structures -----------------------------------------------------------------------------------------------------------
+# ---- structures ------------------------------------------------------------------------------------------------------
 
 
 def structure(*changes: tuple[str, str]) -> Case:

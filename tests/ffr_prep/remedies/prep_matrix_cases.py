@@ -50,7 +50,7 @@ MODELS = [
     changed(K=ROD.K[:3, :3]),
     changed(K=entry(ROD.K, 0, 0, np.nan)),
     changed(K=ROD.K.astype(complex) * 1j),
-    changed(points=np.vstack([ROD.points[:2], [[np.nan, 0, 0]]])),
+    *(changed(points=np.vstack([ROD.points[:2], [[x, 0, 0]]])) for x in (np.nan, 1e200)),
     changed(labels=np.arange(9)),
     changed(components=ROD.components[:3]),
     changed(nodes=ROD.nodes + 1),
@@ -86,7 +86,7 @@ MODELS = [
     ),
 ]
 
-# ---- files ----------------------------------------------------------------------------------------------------------------
+# ---- files -----------------------------------------------------------------------------------------------------------
 
 MARKET, ABAQUS = ("K.mtx", "M.mtx", "rows.csv"), ("abaqus_K.mtx", "abaqus_M.mtx", "deck.inp")
 
@@ -129,6 +129,7 @@ FILES = [
     of(MARKET, "rows.csv", ("\n1,2,0.0", "\n1,2,0.5")),
     of(MARKET, "rows.csv", ("\n1,2,0.0", "\n1,2,left")),
     of(MARKET, "K.mtx", ("real", "complex")),
+    rewritten(lambda _: fp.read_matrices(MARKET), "K.mtx", (("real", "complex"),), (("%%Matrix", "\ufeff%%Matrix"),)),
     of(MARKET, "rows.csv", ("\n1,2,", "\n1,9,")),
     of(ABAQUS, "abaqus_K.mtx", ("1,1,1,1,", "1,1,")),
     of(ABAQUS, "abaqus_K.mtx", ("1,1,1,1,", "x,1,1,1,")),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import subprocess
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -12,7 +13,10 @@ from prep_remedy import box, edited, rewritten, with_files, words
 from said import Case
 
 import ffr_prep as fp
-from ffr_prep.mesh.mesh import check_mesh, read_mesh
+from ffr_prep.mesh import gmsh_files, gmsh_process
+from ffr_prep.mesh.geometry.skin import with_regions
+from ffr_prep.mesh.gmsh_files import _check_geometry, mesh_from_gmsh
+from ffr_prep.mesh.mesh import check_mesh, face_group, read_mesh
 from ffr_prep.mesh.time_limit import mesher_time_limit
 from ffr_prep.pipelines.file_materials import file_materials
 from ffr_prep.structures.frame import Frame
@@ -127,13 +131,14 @@ MATERIALS = [
     edited(materials, "block.inp", ("SECTION, ELSET", "SECTION, ORIENTATION=o, ELSET")),
     edited(materials, "block.inp", ("*ELASTIC", "*ELASTIC, TYPE=LAMINA")),
     edited(materials, "block.inp", ("2.1e11", "stiff")),
+    edited(materials, "block.inp", ("7850.", "7850\0")),
     Case(
         lambda: with_files(lambda: file_materials("mesh.vtu", read_mesh("mesh.vtu")), {}),
         lambda: with_files(lambda: materials(Path("block.inp")), {}),
     ),
 ]
 
-# ---- geometries ---------------------------------------------------------------------------------------------------------
+# ---- geometries ------------------------------------------------------------------------------------------------------
 
 MESHED = "mesh part.geo --size 1 --order 1"
 
@@ -158,7 +163,7 @@ GEOMETRIES = [
     words("mesh bad.geo", MESHED, bad_geo='Merge "other.iges";\n'),
 ]
 
-# ---- regions ------------------------------------------------------------------------------------------------------------
+# ---- regions ---------------------------------------------------------------------------------------------------------
 
 
 def found(query: str, right: str = "plane x=1") -> Case:
@@ -176,12 +181,13 @@ REGIONS = [
     found("patsh*", "patch*"),
     found("patsh_1", "patch_1"),
     found("plane x=2"),
+    found("plane x=1e12"),
     found("nearest 0,0,0", "patch_1"),
     found("plane", "all plane"),
     found("nearest 900,0,0", "nearest 1,0.1,0.05"),
 ]
 
-# ---- regions of nodes -----------------------------------------------------------------------------------------------------
+# ---- regions of nodes ------------------------------------------------------------------------------------------------
 
 
 def frame() -> Frame:
@@ -198,4 +204,65 @@ NODES = [
     Case(p(at_nodes, query), p(at_nodes, "nearest 1,0,0"))
     for query in ("tpi", "sphere r=1", "plane x=0.3", "nearest 9,0,0", "nearest 0.25,0,0")
 ]
-CASES = MESHES + REQUESTS + DECKS + MATERIALS + GEOMETRIES + REGIONS + NODES
+
+# ---- failures of meshers and readers ---------------------------------------------------------------------------------
+
+STEP = Path(__file__).resolve().parents[3] / "meshes" / "link.step"
+IGES = f"{'a part':72}S      1\n"
+
+
+def mesher(code: int = 0, error: Exception | None = None) -> object:
+    """What is said of a process of gmsh that ends so."""
+    done = subprocess.CompletedProcess([], code, "", "killed")
+    with patch.object(gmsh_files, "finished", side_effect=error, return_value=done):
+        return with_files(lambda: mesh_from_gmsh(Path("mesh.msh")), {})
+
+
+def cad(name: str, text: str, unit: str | None) -> object:
+    return with_files(lambda: _check_geometry(Path(name), unit, {}), {name: (("", text),)})
+
+
+def meshed(name: str) -> object:
+    return with_files(lambda: mesh_from_gmsh(Path(name)), {})
+
+
+SOUND = p(meshed, "mesh.msh")
+SOLIDS = replace(
+    PLAIN,
+    points=TWO,
+    blocks=blocks(np.vstack([HEX, HEX + 12])),
+    volume_groups={"one": np.arange(2), "two": np.arange(2, 4)},
+    drawn=((None, ()),),
+)
+
+
+def medit(dimension: int = 3, last: int = 4) -> object:
+    """A tetrahedron in a file of another program that meshio reads."""
+    corners = "\n".join(" ".join([*place[:dimension], "1"]) for place in ("000", "100", "010", "001"))
+    head = f"MeshVersionFormatted 2\nDimension\n{dimension}\nVertices\n4\n{corners}\n"
+    return with_files(lambda: read_mesh("a.mesh"), {"a.mesh": (("", f"{head}Tetrahedra\n1\n1 2 3 {last} 1\nEnd\n"),)})
+
+
+def stepped(query: str) -> object:
+    """The region of a block with a step."""
+    whole = box("hex8", (2, 2, 1))
+    nodes = np.delete(whole.blocks[0].nodes, -1, axis=0)
+    used, numbers = np.unique(nodes, return_inverse=True)
+    return with_regions(fp.Mesh(whole.points[used], blocks(numbers.reshape(nodes.shape)), {}, {}, {}), [query])
+
+
+FAILURES = [
+    Case(p(mesher, gmsh_process.UNLOADABLE), SOUND),
+    Case(p(mesher, -9), SOUND),
+    Case(p(mesher, error=subprocess.TimeoutExpired("gmsh", 600)), SOUND),
+    Case(p(meshed, "table.csv"), SOUND),
+    Case(p(cad, "a.igs", IGES, "m"), p(cad, "a.igs", IGES, None)),
+    Case(p(_check_geometry, STEP, "m", {}), p(_check_geometry, STEP, None, {})),
+    Case(p(check_mesh, SOLIDS), p(check_mesh, PLAIN)),
+    of("block.inp", ("1, 0.0", "1, 1e40")),
+    Case(p(medit, 2), medit),
+    Case(p(medit, last=9), medit),
+    Case(p(stepped, "plane normal=0,1,0"), p(stepped, "all plane normal=0,1,0")),
+    Case(p(face_group, PLAIN, "lid"), p(face_group, PLAIN, "top")),
+]
+CASES = FAILURES + MESHES + REQUESTS + DECKS + MATERIALS + GEOMETRIES + REGIONS + NODES

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
@@ -29,7 +30,7 @@ from ffr_prep.solids.surface_regions import region_triangles
 
 p = partial
 
-# ---- materials ----------------------------------------------------------------------------------------------------------
+# ---- materials -------------------------------------------------------------------------------------------------------
 
 PINE = {"E": (11e9, 0.9e9, 0.5e9), "nu": (0.4, 0.4, 0.4), "G": (0.7e9, 0.6e9, 0.1e9), "rho": 500.0}
 ELASTIC: Rows = tuple(map(tuple, (1e10 * np.eye(6)).tolist()))
@@ -70,7 +71,7 @@ MATERIALS = [
     edited(lambda path: parse_material(str(path)), "material.toml", ("E1 = 1.4e11", 'E1 = "stiff"')),
 ]
 
-# ---- interfaces, conditions, cuts -------------------------------------------------------------------------------------
+# ---- interfaces, conditions, cuts ------------------------------------------------------------------------------------
 
 LEFT, RIGHT = InterfaceRegion("left"), InterfaceRegion("right")
 
@@ -134,7 +135,7 @@ CONDITIONS = [
     Case(p(reduced, LEFT, drawn_modes=0), p(reduced, LEFT, drawn_modes=1)),
 ]
 
-# ---- reductions --------------------------------------------------------------------------------------------------------
+# ---- reductions ------------------------------------------------------------------------------------------------------
 
 
 def by(reduction: object, *interfaces: InterfaceRegion, **more: object) -> fp.FlexibleBody:
@@ -147,6 +148,7 @@ def vectors(value: float, count: int = 28) -> fp.UserVectors:
     return fp.UserVectors(given)
 
 
+SHOWN = fp.Surface(np.zeros((2000, 3)), np.zeros((0, 3), int), np.zeros((2000, 3, 0)))
 RUBIN = p(by, fp.Rubin(2))
 REDUCTIONS = [
     Case(p(reduced, reduction=fp.CraigBampton(2)), p(reduced, reduction=fp.Eigenmodes(2))),
@@ -166,6 +168,7 @@ REDUCTIONS = [
     Case(p(selection_of, {"modes": 1, "frequency": 3.0}, 1), p(selection_of, {"modes": 1}, 1)),
     Case(p(reduced, reduction=fp.Eigenmodes(fp.Accuracy(fp.Band(1, 2), 0.1))), p(reduced, reduction=fp.Eigenmodes(2))),
     Case(p(check_size, 9000, 60, None, None), p(check_size, 90, 6, None, None)),
+    Case(p(check_size, 300, 2, SHOWN, None), p(check_size, 300, 2, SHOWN, 60)),
     Case(p(fp.Solver, "umfpack"), p(by, fp.Guyan(), solver=fp.Solver("superlu"))),
     Case(p(fp.Solver, "cholesky", ranks=2), p(fp.Solver, "cholesky", ranks=1)),
     Case(p(by, fp.Guyan(), solver=fp.Solver("pardiso")), p(by, fp.Guyan(), solver=fp.Solver())),
@@ -176,7 +179,7 @@ REDUCTIONS = [
     Case(lambda: fp.with_reference(RUBIN(), on_nodes(1.0)), lambda: fp.with_reference(RUBIN(), fp.FixedTo("left"))),
 ]
 
-# ---- solids -------------------------------------------------------------------------------------------------------------
+# ---- solids ----------------------------------------------------------------------------------------------------------
 
 FLAT = replace(box(), points=box().points * [1, 1, 0])
 APART = fp.Mesh(
@@ -204,7 +207,7 @@ SOLIDS = [
     Case(p(solids, InterfaceRegion("letf")), p(solids, LEFT)),
 ]
 
-# ---- bodies -------------------------------------------------------------------------------------------------------------
+# ---- bodies ----------------------------------------------------------------------------------------------------------
 
 CLOUD = cloud(3, points=4, stiffness=50.0)
 PLATE = reduced(LEFT, RIGHT)
@@ -212,6 +215,10 @@ PLATE = reduced(LEFT, RIGHT)
 
 def rigid(mass: float = 1.0, inertia: object = (1, 1, 1)) -> fp.FlexibleBody:
     return fp.rigid_body("a", mass=mass, inertia=inertia)
+
+
+def pointed(name: str = "a", x: float = 0.0) -> fp.FlexibleBody:
+    return fp.rigid_body("a", mass=1.0, inertia=(1, 1, 1), points={name: (x, 0, 0)})
 
 
 def damping(**how: object) -> fp.FlexibleBody:
@@ -235,8 +242,8 @@ def loaded(change: object) -> fp.FlexibleBody:
 
 
 def newer(arrays: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    text = arrays["meta"].tobytes().decode().replace('"format_version": 1', '"format_version": 99')
-    return {**arrays, "meta": np.frombuffer(text.encode(), np.uint8)}
+    meta = json.loads(arrays["meta"].tobytes()) | {"format_version": 99}
+    return {**arrays, "meta": np.frombuffer(json.dumps(meta).encode(), np.uint8)}
 
 
 def strange(arrays: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
@@ -264,6 +271,8 @@ BODIES = [
     Case(p(rigid, 1.0, (1, 1)), rigid),
     Case(p(rigid, 1.0, (1, 1, 3)), rigid),
     Case(p(rigid, 1e308), rigid),
+    *(Case(p(pointed, name), pointed) for name in ("", "a.b", "a\nb")),
+    Case(p(pointed, x=1e200), pointed),
     Case(p(fp.truncated, CLOUD, 4), p(fp.truncated, CLOUD, 3)),
     Case(p(fp.truncated, CLOUD, [0, 0]), p(fp.truncated, CLOUD, [0, 1])),
     Case(p(fp.with_point, rigid(), "a", (0, 0, 0)), p(fp.with_point, PLATE, "a", (0, 0, 0))),
@@ -279,6 +288,7 @@ BODIES = [
     Case(p(bare, None), SOUND),
     Case(p(loaded, lambda arrays: {"a": np.ones(1)}), SOUND),
     Case(p(loaded, strange), SOUND),
+    Case(p(loaded, newer), SOUND),
     Case(p(loaded, lambda arrays: {**arrays, "omega2": arrays["omega2"][:1]}), SOUND),
     Case(p(loaded, lambda arrays: {**arrays, "omega2": -arrays["omega2"]}), SOUND),
     Case(p(loaded, lambda arrays: {**arrays, "omega2": arrays["omega2"] * np.nan}), SOUND),
@@ -322,7 +332,7 @@ BODIES = [
     ),
 ]
 
-# ---- parts that are tied ------------------------------------------------------------------------------------------------
+# ---- parts that are tied ---------------------------------------------------------------------------------------------
 
 MEAN = InterfaceRegion("end", "right", "mean")
 

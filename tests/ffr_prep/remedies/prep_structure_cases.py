@@ -18,7 +18,7 @@ from ffr_prep.structures.sections import with_mass_moments
 
 p = partial
 
-# ---- sections -------------------------------------------------------------------------------------------------------------
+# ---- sections --------------------------------------------------------------------------------------------------------
 
 RAIL = {"A": 7.7e-3, "Iy": 3e-5, "Iz": 5.1e-6, "J": 2.2e-6}
 
@@ -42,7 +42,7 @@ SECTIONS = [
     Case(p(fp.Shell, 2e-3, STEEL, -1.0), p(fp.Shell, 2e-3, STEEL, 0.0)),
 ]
 
-# ---- entries that are given from outside ----------------------------------------------------------------------------------
+# ---- entries that are given from outside -----------------------------------------------------------------------------
 
 ENTRIES = [
     Case(p(assignments, ("section.d",)), p(assignments, ("section.d=0.02",))),
@@ -50,7 +50,7 @@ ENTRIES = [
          p(with_entries, {"section": {"d": 0.01}}, {"section.d": "0.02"})),
 ]  # fmt: skip
 
-# ---- frames ---------------------------------------------------------------------------------------------------------------
+# ---- frames ----------------------------------------------------------------------------------------------------------
 
 MEMBER, SHEET = fp.Member(BAR, STEEL, (0, 1, 0)), fp.Shell(2e-3, STEEL)
 LINE, SQUARE = [(0, 0, 0), (1, 0, 0)], [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)]
@@ -109,7 +109,7 @@ FRAMES = [
     ),
 ]  # fmt: skip
 
-# ---- drawings -------------------------------------------------------------------------------------------------------------
+# ---- drawings --------------------------------------------------------------------------------------------------------
 
 DRAWING = """SetFactory("OpenCASCADE");
 Rectangle(1) = {0, 0, 0, 1, 1};
@@ -121,6 +121,12 @@ MeshSize{:} = 1;
 
 def read(text: str = DRAWING, name: str = "frame.geo", **parts: object) -> object:
     return with_files(lambda: fp.read_frame(name, **parts), {name: (("", text),)})
+
+
+def meshed(element: str, **parts: object) -> object:
+    """A mesh of one element of gmsh, without names."""
+    head = "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n3\n1 0 0 0\n2 1 0 0\n3 0 1 0\n$EndNodes\n"
+    return read(f"{head}$Elements\n1\n1 {element}\n$EndElements\n", "a.msh", **parts)
 
 
 SHEETS = p(read, shells={"roof": SHEET})
@@ -138,6 +144,8 @@ DRAWINGS = [
     ),
     Case(p(read, members={"egde": MEMBER}), BARS),
     Case(p(read, DRAWING + 'Physical Curve("side") = {2};\n', members={"edge": MEMBER}), BARS),
+    Case(p(meshed, "1 2 1 1 1 2", shells={"roof": SHEET}), SHEETS),
+    Case(p(meshed, "2 2 1 1 1 2 3", members={"edge": MEMBER}), BARS),
     Case(p(read, "Point(1) = {0, 0, 0};\n", members={"edge": MEMBER}), BARS),
     Case(p(read, "Point(1) = {0, 0, 0};\n", shells={"roof": SHEET}), SHEETS),
 ]
