@@ -181,8 +181,8 @@ def forward(
     common: dict[str, Any] = {"start": start, "end": end, "output_step": output_step, "stabilisation": stabilisation}
     common |= {"outputs": outputs, "progress": progress, "stopwatch": stopwatch}
     wanted = Within() if method is None else method
-    if isinstance(wanted, Within):
-        common["stabilisation"] = _tight(stabilisation, wanted.accuracy)
+    if isinstance(wanted, Within) or stabilisation == Projection():
+        common["stabilisation"] = _tight(stabilisation, getattr(wanted, "accuracy", Within().accuracy))
     runs = _Runs(scene, assembled, start, output_step, common, begin)
     kept = {"events": events, "path": path, "resume": resume}
     method, count = _resumed(resume, wanted, output_step)

@@ -77,8 +77,8 @@ def test_a_batch_that_is_interrupted_ends_its_runs(tmp_path):
     def stop(done, total):
         raise KeyboardInterrupt
 
-    paths = [tmp_path / f"{k}.nc" for k in range(4)]
-    scenes = [swinging(1.0), *(swinging(k) for k in range(2, 5))]
+    paths = [tmp_path / f"{k}.nc" for k in range(40)]
+    scenes = [swinging(0.1 * k) for k in range(40)]
     with pytest.raises(KeyboardInterrupt):
         fd.forward_many(scenes, paths=paths, threads=2, progress=stop, **{**HOW, "end": 2.0})
     assert any(fd.load_result(path).attributes["status"] == "complete" for path in paths if path.exists())

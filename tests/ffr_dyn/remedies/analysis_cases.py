@@ -92,7 +92,7 @@ def older(content: np.ndarray) -> np.ndarray:
 def continued(settings: object) -> Result:
     with TemporaryDirectory() as folder:
         path = Path(folder) / "run.nc"
-        run(HINGED, path=path)
+        forward(HINGED, end=0.1, output_step=0.01, method=ROS2(1e-3), check=False, path=path)
         return whole.run(HINGED, settings, resume=path)
 
 

@@ -20,7 +20,7 @@ from ffr_dyn.studies.draw import plot_study
 from ffr_dyn.studies.measures import attribute
 from ffr_dyn.studies.plan import study
 from ffr_dyn.studies.sampling import Axis, Spread, points, spaced
-from ffr_dyn.studies.table import Journal, Table, load_table
+from ffr_dyn.studies.table import FORMAT, Journal, Table, load_table
 from ffr_dyn.studies.workers import _refused, crew
 
 p = partial
@@ -58,11 +58,12 @@ def swept(outputs: dict[str, str] = ANGLE, *, space: bool = True, another: bool 
     return inside(sweep)
 
 
-def read(*, study: bool) -> object:
+def read(*, study: bool, of_format: int = FORMAT) -> object:
     def load() -> Table:
         scene, settings = fd.load_scene("bar.toml")
         fd.forward(scene, **settings.span, method=settings.method, check=False, path="run.nc")
-        fd.sweep(fd.study("bar.toml", G, ANGLE), "table.nc", workers=0)
+        with patch("ffr_dyn.studies.table.FORMAT", of_format):
+            fd.sweep(fd.study("bar.toml", G, ANGLE), "table.nc", workers=0)
         return load_table("table.nc" if study else "run.nc")
 
     return inside(load)
@@ -125,6 +126,12 @@ CASES = [
     Case(p(spaced, 0, 1, 0), p(spaced, 0, 1, 2)),
     Case(p(spaced, 0, 1, 2, logarithmic=True), p(spaced, 0.1, 1, 2, logarithmic=True)),
     Case(p(points, {"a": SHORT, "b": LONG}, paired=True), p(points, {"a": SHORT, "b": SHORT}, paired=True)),
+    Case(p(spaced, 0, np.inf, 2), p(spaced, 0, 1, 2)),
+    Case(asked(G, samples=4), asked(G)),
+    Case(asked({"g": NORMAL}, samples=4, seed=-1), asked({"g": NORMAL}, samples=4, seed=1)),
+    Case(asked(G, {**ANGLE, "twice": "= angle * t"}), asked(G, {**ANGLE, "twice": "= 2 * angle"})),
+    Case(asked(G, {**ANGLE, "a": "= b", "b": "= a"}), asked(G, {**ANGLE, "a": "= 2 * angle", "b": "= a"})),
+    Case(p(read, study=True, of_format=99), p(read, study=True)),
     Case(p(points, {"x": NORMAL}), p(points, {"x": NORMAL}, samples=4)),
     Case(p(points, FULL), p(points, {"a": NORMAL, "b": NORMAL}, samples=4)),
     Case(p(sampled, Spread("uniform", (1.0, np.nan))), p(sampled, Spread("uniform", (1.0, 2.0)))),

@@ -228,7 +228,7 @@ def test_a_run_that_fails_is_a_row_with_its_message(folder):
     (('"bar.toml"', '"rab.toml"'), "rab.toml.* does not exist"),
     (("g = [1", "g = [nan"), r"parameters.g = \[nan, .*finite numbers"),
     (("g = [1", "g = [true"), r"parameters.g = \[True, .*finite numbers"),
-    (("to = 2.0", "to = inf"), "parameters.length: there are no finite values from 0.5 to inf"),
+    (("to = 2.0", "to = inf"), "parameters.length: from and to are numbers in SI units, count a whole one"),
     (("scene =", "seed = -1\nscene ="), "seed is -1; give a whole number, 0 or more"),
     (("scene =", "samples = 10\nscene ="), "samples = 10 changes nothing: no parameter has a distribution"),
     (("= force / g", "= forc / g"), "outputs.weight: in the formula 'forc / g', 'forc' is not known; did you mean 'force'"),

@@ -213,8 +213,8 @@ CLOUD = cloud(3, points=4, stiffness=50.0)
 PLATE = reduced(LEFT, RIGHT)
 
 
-def rigid(mass: float = 1.0, inertia: object = (1, 1, 1)) -> fp.FlexibleBody:
-    return fp.rigid_body("a", mass=mass, inertia=inertia)
+def rigid(mass: float = 1.0, inertia: object = (1, 1, 1), centre: object = (0, 0, 0)) -> fp.FlexibleBody:
+    return fp.rigid_body("a", mass=mass, inertia=inertia, centre_of_mass=centre)
 
 
 def pointed(name: str = "a", x: float = 0.0) -> fp.FlexibleBody:
@@ -267,6 +267,7 @@ ROD = fp.reduce(
 )
 SECOND = reduced(LEFT, RIGHT, linear=False)
 BODIES = [
+    Case(p(rigid, centre=(0, 0)), rigid),
     Case(p(rigid, -1.0), rigid),
     Case(p(rigid, 1.0, (1, 1)), rigid),
     Case(p(rigid, 1.0, (1, 1, 3)), rigid),
