@@ -345,11 +345,12 @@ def _cost(assembled: Assembled, result: Result) -> float:
 def _finished(runs: _Runs, trial: _Trial, path: str | Path | None, ringing: Set[str] = frozenset()) -> Result:
     """The result of a run with its errors, here and in its file; `ringing` outputs are told to be so."""
     result = trial.result
-    notes = [*result.attributes["notes"], *_unseen(trial), *_unresolved(runs, trial, ringing), *_coarse(result)]
+    unseen = _unseen(trial)
+    notes = [*result.attributes["notes"], *unseen, *_unresolved(runs, trial, ringing), *_coarse(result)]
     told = {name: [e.error, e.of_range] for name, e in trial.errors.items()}
     more: dict[str, Any] = {"notes": notes, "errors": told}
     if trial.errors:
-        more["accuracy"] = _worst(trial.errors)
+        more["accuracy"] = _at_least(trial.errors) if unseen else _worst(trial.errors)
         more["effort"] = sum(runs.work) / max(1, result.attributes["evaluations"])
     attributes = {**result.attributes, **more}
     if path is not None:
@@ -362,6 +363,12 @@ def _worst(errors: Mapping[str, StepError]) -> str:
     places = max((e.of_range for one, e in errors.items() if PLACES.search(one)), default=None)
     rest = "" if places is None or PLACES.search(name) else f"; positions and angles within {_percent(places)}"
     return f"step: within {_of_the_range(errors[name].of_range)} of {name}{rest}"
+
+
+def _at_least(errors: Mapping[str, StepError]) -> str:
+    """Of errors that leave out what the steps damp."""
+    name = max(errors, key=lambda one: errors[one].of_range)
+    return f"step: not known; {name} is off by {_of_the_range(errors[name].of_range)} or more"
 
 
 def _of_the_range(share: float) -> str:

@@ -7,8 +7,9 @@ import pytest
 
 from ffr_dyn.analyses.forward import forward
 from ffr_dyn.consistency.step_error import COARSE, IN_PART, Beside, ranges, step_errors, too_coarse
-from ffr_dyn.integrators import ROS3
+from ffr_dyn.integrators import ROS2, ROS3
 from ffr_dyn.results.result import Quantity, Result
+from ffr_dyn.scene.forces.joint_spring import JointSpring
 from ffr_dyn.scene.joints import Joint
 from ffr_dyn.scene.scene import Body, Scene
 from ffr_prep.body import rigid_body
@@ -133,3 +134,17 @@ def test_a_rate_finds_a_vibration_that_rows_catch_in_the_same_phase_again_and_ag
     omega = 2 * np.pi * (TIME.size - 1) / rows
     found = too_coarse(result(a_position=TIME + np.sin(omega * TIME), a_velocity=1 + omega * np.cos(omega * TIME)))
     assert (found.get("a.position", 0.0) > COARSE) == told
+
+
+def test_an_error_is_not_told_where_the_run_that_shows_vibration_fails():
+    """The steps damp the vibration of a stiff spring at once, and the twin that keeps it does not bear its frequency."""
+    block = rigid_body("b", mass=1.0, inertia=[0.1] * 3, points={"o": (0, 0, 0)})
+    scene = Scene(
+        (Body("b", block, position=(0.01, 0, 0)),),
+        (Joint("g", "translational", "ground.o", "b.o", axis=(1, 0, 0)),),
+        ground={"o": (0, 0, 0)},
+        forces=(JointSpring("k", "g", stiffness=1e8, coordinate="stroke"),),
+    )
+    found = forward(scene, end=0.5, output_step=0.01, method=ROS2(1e-2))
+    assert found.attributes["accuracy"].startswith("step: not known; ")
+    assert any("leaves out vibration that the steps damp" in note for note in found.attributes["notes"])

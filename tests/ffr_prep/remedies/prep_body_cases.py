@@ -12,7 +12,7 @@ import numpy as np
 import scipy.optimize
 from boxes import STEEL, box_mesh
 from matrix_models import rod
-from prep_remedy import box, reduced, with_files
+from prep_remedy import box, raising, reduced, with_files, with_part
 from said import Case
 from synthetic import cloud
 
@@ -32,19 +32,6 @@ from ffr_prep.solids.surface_regions import region_triangles
 
 p = partial
 LEFT, RIGHT = InterfaceRegion("left"), InterfaceRegion("right")
-
-
-def with_part(owner: object, name: str, value: object, act: object) -> object:
-    """Do it with another value of a part of a module."""
-    with patch.object(owner, name, value):
-        return act()
-
-
-def raising(error: Exception) -> object:
-    def raises(*_: object, **__: object) -> None:
-        raise error
-
-    return raises
 
 
 # ---- integrals, surfaces, planes -------------------------------------------------------------------------------------

@@ -15,7 +15,7 @@ from unittest.mock import patch
 import numpy as np
 import scipy.sparse as sp
 from boxes import STEEL
-from prep_remedy import box, reduced, with_files
+from prep_remedy import box, raising, reduced, with_files, with_part
 from said import Case
 
 import ffr_prep as fp
@@ -35,19 +35,6 @@ from ffr_prep.solvers.verification import verified
 
 p = partial
 LEFT, RIGHT = InterfaceRegion("left"), InterfaceRegion("right")
-
-
-def with_part(owner: object, name: str, value: object, act: object) -> object:
-    """Do it with another value of a part of a module."""
-    with patch.object(owner, name, value):
-        return act()
-
-
-def raising(error: Exception) -> object:
-    def raises(*_: object, **__: object) -> None:
-        raise error
-
-    return raises
 
 
 # ---- solvers ---------------------------------------------------------------------------------------------------------

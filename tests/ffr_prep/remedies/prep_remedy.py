@@ -9,6 +9,7 @@ from contextlib import chdir
 from functools import cache, partial
 from pathlib import Path
 from tempfile import TemporaryDirectory, mkdtemp
+from unittest.mock import patch
 
 from boxes import box_mesh
 from mutated_inputs import make_samples
@@ -115,3 +116,18 @@ def reduced(*interfaces: str | InterfaceRegion, mesh: Mesh | None = None, **more
     regions = [InterfaceRegion(one) if isinstance(one, str) else one for one in interfaces]
     usual = {"name": "box", "reduction": CraigBampton(modes=2), "reference": MeanAxis(), "linear": True}
     return reduce(from_mesh(mesh or box(), material("steel"), regions), Request(**{**usual, **more}))
+
+
+def with_part(owner: object, name: str, value: object, act: Callable[[], object]) -> object:
+    """Do it with another value of a part of a module."""
+    with patch.object(owner, name, value):
+        return act()
+
+
+def raising(error: Exception) -> Callable[..., object]:
+    """A function that raises an error, whatever it is given."""
+
+    def raises(*_: object, **__: object) -> None:
+        raise error
+
+    return raises
