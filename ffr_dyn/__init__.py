@@ -49,6 +49,7 @@ _BY_MODULE = {
     "ffr_dyn.compile.first_use": "begin_compiling",
     "ffr_dyn.results.file": "load_result save_result",
     "ffr_dyn.results.result": "Axis Quantity Result write_csv",
+    "ffr_dyn.results.stress_error": "stress_error",
     "ffr_dyn.results.stress": "hot_spots peaks section_forces section_histories section_peaks stress_histories",
     "ffr_dyn.consistency.assemble": "Assembled assemble",
     "ffr_dyn.consistency.mobility": "Mobility mobility",

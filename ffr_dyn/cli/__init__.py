@@ -210,6 +210,8 @@ def _errors(told: dict[str, list[float]], units: dict[str, str]) -> list[str]:
 
 def _attribute(key: str, value: Any) -> list[str]:
     """An attribute in lines: numbers with their units on one, texts and what is named a line each."""
+    if key == "left_out_stress":
+        return [f"{', '.join(value)}: per unit acceleration, which `ffr-dyn stress` makes an error of"]
     if key == "connections":
         return [f"{name} ({of['kind']}): {', '.join(of['at']) or 'everywhere'}" for name, of in value.items()]
     if isinstance(value, dict):

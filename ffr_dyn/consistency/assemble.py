@@ -25,9 +25,10 @@ from ffr_dyn.consistency.validity import deflections
 from ffr_dyn.equations.constraint_rows import Block, blocks_of
 from ffr_dyn.equations.layout import Layout, initial_state
 from ffr_dyn.scene.scene import Scene, altered, require_scene
+from ffr_dyn.scene.sensors import StressMeasurement
 from ffr_dyn.variants.mean_axis import in_mean_axis_frames
 from ffr_dyn.variants.plane import obstacles, planar_forms
-from ffr_prep.body import mesh_doubt
+from ffr_prep.body import mesh_doubt, steady_stress_doubt
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.brief import Brief
 from ffr_prep.common.errors import InputError
@@ -100,8 +101,7 @@ def assemble(scene: Scene, *, time: float = 0.0) -> Assembled:
             "across it"
         )
     notes += sliding_notes(scene)
-    doubts = ((body.name, mesh_doubt(body.model.provenance)) for body in scene.bodies)
-    notes += [f"body {name!r}: {doubt}" for name, doubt in doubts if doubt]
+    notes += body_doubts(scene)
     notes += held_frequencies(
         declared, [(x[place.R(b)], x[place.p(b)]) for b in range(len(place.n))], scene.plane, time
     )
@@ -109,6 +109,14 @@ def assemble(scene: Scene, *, time: float = 0.0) -> Assembled:
     free = _movable(place) - count
     system = compile_scene(scene, kept) if redundant else rows.engine.system
     return Assembled(system, all_rows, x, v, free, tuple(notes), tuple(redundant), flat.computed)
+
+
+def body_doubts(scene: Scene) -> list[str]:
+    """Notes on bodies whose mesh is too coarse, and on those whose stress is measured and lacks that of their inertia."""
+    measured = {of.body for of in scene.measurements if isinstance(of, StressMeasurement)}
+    doubts = [(body.name, mesh_doubt(body.model.provenance)) for body in scene.bodies]
+    doubts += [(b.name, steady_stress_doubt(b.model.provenance)) for b in scene.bodies if b.name in measured]
+    return [f"body {name!r}: {doubt}" for name, doubt in doubts if doubt]
 
 
 def shifted(scene: Scene, place: Layout, guess: Array, x: Array) -> list[str]:

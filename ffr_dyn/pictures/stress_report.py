@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import csv
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from html import escape
 from pathlib import Path
 
@@ -27,6 +27,7 @@ from ffr_dyn.results.stress import (
     stressed_bodies,
     stressed_surface,
 )
+from ffr_dyn.results.stress_error import stress_error
 from ffr_dyn.results.wholes import with_wholes
 from ffr_dyn.scene.stress_sensors import measure, nearest_element
 from ffr_prep.body import Surface
@@ -38,6 +39,7 @@ from ffr_prep.common.units import readable
 Places = dict[str, Array]
 
 _SIZE = (1200, 800)
+_TOLD = 5.0  # % of the largest stress that may be missing without a remedy beside it
 _VIEWS = {
     0: Camera((1.0, 0.30, 0.45), (0.0, 0.0, 1.0)),
     1: Camera((0.30, -1.0, 0.45), (0.0, 0.0, 1.0)),
@@ -47,12 +49,17 @@ _VIEWS = {
 
 @dataclass(frozen=True)
 class StressReport:
-    """Hot spots, the largest section forces by body of beams, and the files that were written."""
+    """Hot spots, the largest section forces by body of beams, and the files that were written.
+
+    errors : by body the largest von Mises stress [Pa] that its shapes leave out, where that is known, and the largest that
+             they show
+    """
 
     quantity: str
     spots: tuple[HotSpot, ...]
     sections: dict[str, tuple[SectionPeak, ...]]
     files: tuple[Path, ...]
+    errors: dict[str, tuple[float, float]] = field(default_factory=dict)
 
     def _repr_html_(self) -> str:
         """The report in words, and its pictures, for a notebook."""
@@ -96,7 +103,15 @@ def stress_report(
     beams = [name for name in bodies if result.geometry[name].beams is not None]
     files += [file for name in beams for file in _section_files(result, name, points, folder)]
     files += [_peak_picture(result, name, spots, quantity, folder / f"{name}.png") for name in bodies]
-    return StressReport(quantity, spots, {name: section_peaks(result, name) for name in beams}, tuple(files))
+    sections = {name: section_peaks(result, name) for name in beams}
+    return StressReport(quantity, spots, sections, tuple(files), dict(_errors(result, bodies)))
+
+
+def _errors(result: Result, bodies: Sequence[str]) -> Iterator[tuple[str, tuple[float, float]]]:
+    for name in bodies:
+        error = stress_error(result, name)
+        if error is not None:
+            yield name, (error, float(peaks(result, name)[0].max()))
 
 
 def report_lines(report: StressReport) -> Iterator[str]:
@@ -111,6 +126,7 @@ def report_lines(report: StressReport) -> Iterator[str]:
     for k, spot in enumerate(report.spots):
         at = ", ".join(f"{x:9.5g}" for x in spot.position)
         yield f"{k + 1:7d}     {factor * spot.value:10.4g}  {spot.body:{width}}  ({at})  {spot.time:.6g}"
+    yield from (_accuracy(body, *of) for body, of in report.errors.items())
     for body, sections in report.sections.items():
         yield f"sections    largest section forces of {body}"
         for peak in sections:
@@ -119,6 +135,16 @@ def report_lines(report: StressReport) -> Iterator[str]:
             yield f"{peak.force:>7}     {peak.value:10.4g} {unit:3}  {where:24}  {peak.time:.6g}"
     for file in report.files:
         yield f"file        {file}"
+
+
+def _accuracy(body: str, error: float, largest: float) -> str:
+    """What the shapes of a body leave out of the stress of its own inertia, and what mends it."""
+    factor, unit = readable("Pa", error)
+    share = 100 * error / largest if largest else 0.0
+    told = f"accuracy    {body}: its shapes leave out up to {factor * error:.2g} {unit} of the stress of its own inertia"
+    of = f", {share:.2g} % of the largest" if largest else ""
+    mend = "; reduce it with --method craig-bampton --method inertia-relief" if share > _TOLD else ""
+    return f"{told}{of}{mend}"
 
 
 # ---- tables and histories -----------------------------------------------------------------------------------------

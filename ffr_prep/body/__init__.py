@@ -42,10 +42,12 @@ from ffr_prep.body.second_order import (
     some_points,
     values,
 )
+from ffr_prep.body.steady_stress import STEADY_STRESS, left_out_stress, steady_stress_doubt
 
 __all__ = [
     "MESH_ERROR",
     "SECTION_FORCES",
+    "STEADY_STRESS",
     "TENSOR",
     "BeamForces",
     "BodyError",
@@ -68,6 +70,7 @@ __all__ = [
     "idle_loads",
     "immovable",
     "interface_motions",
+    "left_out_stress",
     "linear_surface",
     "load_body",
     "mass_of_motions",
@@ -83,6 +86,7 @@ __all__ = [
     "save_arrays",
     "save_body",
     "some_points",
+    "steady_stress_doubt",
     "surface_arrays",
     "surface_of",
     "truncated",

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from ffr_prep.body import Damping, FlexibleBody, Interface, mesh_doubt, with_damping
+from ffr_prep.body import Damping, FlexibleBody, Interface, mesh_doubt, steady_stress_doubt, with_damping
 from ffr_prep.body.provenance import described
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError, InputError
@@ -26,6 +26,7 @@ from ffr_prep.reduction.mesh_error import mesh_error
 from ffr_prep.reduction.quality import assess, completed
 from ffr_prep.reduction.second_order import check_size, with_second_order
 from ffr_prep.reduction.selection import Band
+from ffr_prep.reduction.steady_stress import steady_stress
 from ffr_prep.solvers.factor import CHOLESKY, FreeBody, Solver, SupportedBody, solve_refined, supported
 from ffr_prep.solvers.threads import on_one_thread
 
@@ -155,8 +156,10 @@ def _reduced(model: Model, request: Request, progress: Stages, advance: Advance)
     assessed = assess(coupled, body, L, basis, request.quality) if request.quality else None
     progress("integrate the inertia")
     integrals = model.inertia(basis.Z)
+    of_stress: dict[str, Any] = {}
     if request.stress:
         progress("recover the stress")
+        of_stress = steady_stress(model, body, L, basis) if basis.omega2.size and not model.massless else {}
     surface = (model.stressed if request.stress else model.surface)(basis.Z)
     if request.stress and surface is None:
         raise InputError("no part of this model knows its stress: reduce it without")
@@ -170,14 +173,14 @@ def _reduced(model: Model, request: Request, progress: Stages, advance: Advance)
             progress("compute the second order of the surface")
             drawn = replace(basis, Z=basis.Z[:, : request.drawn_modes], omega2=basis.omega2[: request.drawn_modes])
             surface = with_second_order(surface, model, held, request.reference, drawn, advance)
-    doubts = [*model.doubts(basis.Z), *filter(None, [mesh_doubt(of_mesh)])]
+    doubts = [*model.doubts(basis.Z), *filter(None, [mesh_doubt(of_mesh), steady_stress_doubt(of_stress)])]
     made = FlexibleBody(
         name=request.name,
         omega2=basis.omega2,
         interfaces=interface_shapes(coupled, basis),
         surface=surface,
         stiffening=stiffening,
-        provenance=completed(record(model, request, doubts) | of_mesh, basis, assessed),
+        provenance=completed(record(model, request, doubts) | of_mesh | of_stress, basis, assessed),
         damping=model.damping(basis.Z),
         **vars(integrals),
     )

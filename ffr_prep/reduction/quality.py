@@ -21,7 +21,7 @@ import numpy as np
 from ffr_prep.common.arrays import Array
 from ffr_prep.model.coupled import CoupledModel
 from ffr_prep.model.reactions import inertial_loads
-from ffr_prep.reduction.basis import Basis, in_frame
+from ffr_prep.reduction.basis import Basis
 from ffr_prep.reduction.mesh_resolution import resolution_warnings
 from ffr_prep.reduction.modes import modes_up_to
 from ffr_prep.reduction.receptance import (
@@ -34,6 +34,7 @@ from ffr_prep.reduction.receptance import (
 )
 from ffr_prep.reduction.responses import mean_motion, static_solver
 from ffr_prep.reduction.selection import Band
+from ffr_prep.reduction.steady_stress import steady_responses
 from ffr_prep.solvers.factor import FreeBody, supported
 
 ACCELERATIONS = (
@@ -178,14 +179,11 @@ def steady_errors(model: CoupledModel, body: FreeBody, L: Array, basis: Basis) -
 def _steady_errors_under(model: CoupledModel, body: FreeBody, supports: Array, basis: Basis) -> Array:
     """(2, 12) errors with the body held by the supports (s, Z)."""
     loads = inertial_loads(model)
-    exact = static_solver(model, body, supports)(loads)
-    Z = basis.Z if len(supports) > 6 else in_frame(model, supports, basis.Z)
-    forces = Z.T @ loads
-    found = Z @ (forces / basis.omega2[:, None])
+    exact, left_out = steady_responses(model, body, supports, basis)
     energy = np.einsum("zi,zi->i", exact, loads)
-    missing = energy - np.einsum("ni,ni->i", forces, forces / basis.omega2[:, None])
+    missing = np.einsum("zi,zi->i", left_out, loads)
     noise = _NOTHING * np.einsum("zi,zi->i", np.abs(exact), np.abs(loads))
-    displacement = _norms(model, exact - found) / _sizes(_norms(model, exact))
+    displacement = _norms(model, left_out) / _sizes(_norms(model, exact))
     stress = np.sqrt(np.maximum(missing, 0.0)) / _sizes(np.sqrt(np.maximum(energy, 0.0)))
     return np.where(energy > noise, [displacement, stress], np.nan)
 

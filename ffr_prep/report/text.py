@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ffr_prep.body import MESH_ERROR, FlexibleBody, mesh_errors_of
+from ffr_prep.body import MESH_ERROR, STEADY_STRESS, FlexibleBody, mesh_errors_of
 from ffr_prep.body.interface_freedom import interface_freedom
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.in_words import settings_in_words, vector_in_words
@@ -295,6 +295,7 @@ def _origin_lines(provenance: Mapping[str, Any]) -> Iterator[str]:
             "normal_modes",
             "held_body",
             MESH_ERROR,
+            STEADY_STRESS,
             "regions",
             "command",
         ):

@@ -36,6 +36,7 @@ from ffr_dyn.results.stress import (
     tensors,
     values_at,
 )
+from ffr_dyn.results.stress_error import stress_error
 from ffr_dyn.scene.drivers import Driver
 from ffr_dyn.scene.joints import Joint
 from ffr_dyn.scene.scene import Body, Scene
@@ -47,7 +48,7 @@ from ffr_dyn.scene.stress_sensors import (
     strain_of,
     von_mises,
 )
-from ffr_prep.body import SECTION_FORCES, BeamForces, Surface
+from ffr_prep.body import SECTION_FORCES, BeamForces, Surface, steady_stress_doubt
 from ffr_prep.common.errors import InputError
 from ffr_prep.mesh.mesh import Block
 from ffr_prep.model.coupled import InterfaceRegion
@@ -268,7 +269,7 @@ def settled(body, *parts):
 
 
 @pytest.mark.parametrize(("relief", "smallest", "largest"), [(True, 0.0, 0.003), (False, 0.5, 1.1)])
-def test_a_rotating_bar_has_the_tension_of_the_mass_beyond(relief, smallest, largest):
+def test_a_rotating_bar_has_the_tension_of_the_mass_beyond(relief, smallest, largest, tmp_path):
     """sigma = E (cos kx / cos kL - 1), k^2 = rho Omega^2 / E, or nearly rho Omega^2 (L^2 - x^2) / 2.
 
     Fixed-interface modes alone, the first ones being bending, carry none of it: inertia needs shapes of its own.
@@ -295,7 +296,13 @@ def test_a_rotating_bar_has_the_tension_of_the_mass_beyond(relief, smallest, lar
     exact = np.zeros_like(found)
     exact[:, 0] = material.E * (np.cos(k * bar.surface.points[:, 0]) / np.cos(k) - 1)
     assert exact.max() == pytest.approx(material.rho * SPIN**2 / 2, rel=1e-4)
-    assert smallest <= np.abs(found - exact).max() / exact.max() < largest
+    missing = np.abs(found - exact).max()
+    assert smallest <= missing / exact.max() < largest
+    told = stress_error(result, "body")
+    assert missing - 0.003 * exact.max() <= told <= 1.05 * missing
+    assert bool(steady_stress_doubt(bar.provenance)) is not relief
+    written = [line for line in report_lines(stress_report(result, tmp_path)) if line.startswith("accuracy")]
+    assert ("--method inertia-relief" in written[0]) is not relief
 
 
 def ring(elements, radius, thickness):
