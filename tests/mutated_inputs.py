@@ -417,7 +417,7 @@ def formats() -> dict[str, tuple[tuple[str, ...], Callable[[Path], object]]]:
 
     def told_of_step(text: str) -> None:
         length_unit(text)
-        face_labels(text, ["plane"])
+        face_labels(text, [["plane"]])
 
     def with_materials(path: Path) -> None:
         mesh = read_mesh(path)

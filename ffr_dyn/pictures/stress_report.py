@@ -141,7 +141,9 @@ def _accuracy(body: str, error: float, largest: float) -> str:
     """What the shapes of a body leave out of the stress of its own inertia, and what mends it."""
     factor, unit = readable("Pa", error)
     share = 100 * error / largest if largest else 0.0
-    told = f"accuracy    {body}: its shapes leave out up to {factor * error:.2g} {unit} of the stress of its own inertia"
+    told = (
+        f"accuracy    {body}: its shapes leave out up to {factor * error:.2g} {unit} of the stress of its own inertia"
+    )
     of = f", {share:.2g} % of the largest" if largest else ""
     mend = "; reduce it with --method craig-bampton --method inertia-relief" if share > _TOLD else ""
     return f"{told}{of}{mend}"

@@ -24,6 +24,7 @@ Regions: wherever a surface is named, it may be found by what it is instead.
   plane z=0                          the plane there; also x=, y=, normal=-z, at 0,0,5
   nearest 10,0,5                     the surface nearest to a point, in however many faces
   cylinder r=6mm near 10,0,5         of those that fit the nearest;   all cylinder r=6mm   all of them
+  cylinder r=6mm solid=pin#2         of a solid of an assembly
   Numbers without a unit are in that of the file. `ffr-prep faces PART` tells what to type for each face.
 """
 UNIT = click.option(

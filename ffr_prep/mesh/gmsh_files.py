@@ -13,6 +13,7 @@ import sys
 import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import groupby
 from pathlib import Path
 from typing import Any
 
@@ -275,8 +276,17 @@ def _drawn_faces(path: Path, stored: Mapping[str, Array], names: Mapping[str, An
     ]
     if path.suffix.lower() not in (".step", ".stp"):
         return tuple(faces)
-    labels = face_labels(read_text(path, _STEP), [face.kind for face in faces])
-    return tuple(replace(f, label=f.label or label) for f, label in zip(faces, labels, strict=True))
+    of_solids = [list(group) for _, group in groupby(faces, key=lambda face: face.solids)]
+    glued = any(len(face.solids) > 1 for face in faces)  # into solids whose faces are not those of the file
+    labels = [""] * len(faces)
+    if not glued:
+        labels = face_labels(read_text(path, _STEP), [[face.kind for face in group] for group in of_solids])
+    return tuple(replace(f, label=label or _own_label(f)) for f, label in zip(faces, labels, strict=True))
+
+
+def _own_label(face: DrawnFace) -> str:
+    """The label of the CAD library, which repeats that of the solid for faces with a colour of their own."""
+    return "" if face.label in {solid.rpartition("#")[0] or solid for solid in face.solids} else face.label
 
 
 def _faces(stored: Mapping[str, Array], names: Mapping[str, list[str]]) -> dict[str, tuple[Array, Array]]:

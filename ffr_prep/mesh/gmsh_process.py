@@ -122,10 +122,9 @@ def _choose(gmsh: Any, job: dict[str, Any]) -> None:
 
 def _keep(gmsh: Any, wanted: list[str]) -> None:
     """Remove all solids but those of these names, which may be patterns."""
-    names = {
-        tag: [f"volume_{tag}", _given_name(gmsh.model.getEntityName(3, tag))] for _, tag in gmsh.model.getEntities(3)
-    }
-    known = ", ".join(repr(name or own) for own, name in names.values())
+    given, own = _given_names(gmsh, 3), _solid_names(gmsh)
+    names = {tag: [f"volume_{tag}", given[tag], own[tag]] for tag in given}
+    known = ", ".join(map(repr, own.values()))
     kept = {tag for tag, of in names.items() if any(fnmatch.fnmatchcase(one, word) for one in of for word in wanted)}
     for word in wanted:
         if not any(fnmatch.fnmatchcase(one, word) for of in names.values() for one in of):
@@ -331,11 +330,11 @@ def _skin(gmsh: Any) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
     arrays, index_of = _points(gmsh)
     names: dict[str, Any] = {}
     _add_geometry(gmsh, index_of, arrays, names)
-    known = {tag for _, tag in gmsh.model.occ.getEntities(3)}
+    known, given = {tag for _, tag in gmsh.model.occ.getEntities(3)}, _given_names(gmsh, 3)
     names["solids"] = [
         {
             "name": f"volume_{tag}",
-            "label": _given_name(gmsh.model.getEntityName(3, tag)),
+            "label": given[tag],
             "volume": gmsh.model.occ.getMass(3, tag),
             "centre": list(gmsh.model.occ.getCenterOfMass(3, tag)),
             "inertia": list(gmsh.model.occ.getMatrixOfInertia(3, tag)),
@@ -348,7 +347,7 @@ def _skin(gmsh: Any) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
 
 def _add_geometry(gmsh: Any, index_of: np.ndarray, arrays: dict[str, np.ndarray], names: dict[str, Any]) -> None:
     """The faces of the solids that are drawn and not only meshed: their kind, numbers, names, colour and corners."""
-    names["geometry"] = []
+    names["geometry"], solid_names = [], _solid_names(gmsh)
     known = {tag for _, tag in gmsh.model.occ.getEntities(2)}
     drawn = [tag for _, tag in gmsh.model.getEntities(2) if gmsh.model.getType(2, tag) != "Discrete surface"]
     types = [
@@ -372,7 +371,7 @@ def _add_geometry(gmsh: Any, index_of: np.ndarray, arrays: dict[str, np.ndarray]
                 "label": _given_name(gmsh.model.getEntityName(2, tag)),
                 "colour": f"#{red:02x}{green:02x}{blue:02x}" if alpha else "",
                 "groups": groups,
-                "solids": [_given_name(gmsh.model.getEntityName(3, s)) or f"volume_{s}" for s in solids],
+                "solids": [solid_names[s] for s in solids],
             }
         )
         for corners in (3, 4):
@@ -406,12 +405,32 @@ def _groups(gmsh: Any, dimension: int) -> dict[str, list[int]]:
         groups.setdefault(name, []).extend(int(e) for e in gmsh.model.getEntitiesForPhysicalGroup(dimension, tag))
     if groups:
         return groups
-    for _, tag in gmsh.model.getEntities(dimension):
+    one_by_one = _solid_names(gmsh) if dimension == 3 else {}
+    for tag, name in _given_names(gmsh, dimension).items():
         groups[f"{('point', 'curve', 'surface', 'volume')[dimension]}_{tag}"] = [tag]
-        name = _given_name(gmsh.model.getEntityName(dimension, tag))
         if name:
             groups.setdefault(name, []).append(tag)
+            groups[one_by_one.get(tag, name)] = groups.get(one_by_one.get(tag, name), [tag])
     return groups
+
+
+def _given_names(gmsh: Any, dimension: int) -> dict[int, str]:
+    """The name that the file has for each entity, or "", by its tag."""
+    return {
+        int(tag): _given_name(gmsh.model.getEntityName(dimension, tag)) for _, tag in gmsh.model.getEntities(dimension)
+    }
+
+
+def _solid_names(gmsh: Any) -> dict[int, str]:
+    """A name for each solid that no other has: the file's, numbered where several share it ("pin#2"), or its tag."""
+    given = _given_names(gmsh, 3)
+    shared = {name for name in given.values() if list(given.values()).count(name) > 1}
+    found, seen = {}, dict.fromkeys(shared, 0)
+    for tag, name in given.items():
+        if name in seen:
+            seen[name] += 1
+        found[tag] = f"{name}#{seen[name]}" if name in shared and name else name or f"volume_{tag}"
+    return found
 
 
 def _physical_name(gmsh: Any, dimension: int, tag: int) -> str:

@@ -14,7 +14,7 @@ from scipy import ndimage
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.brief import numbers
 from ffr_prep.mesh.geometry.face import METRES, Face
-from ffr_prep.mesh.geometry.faces import Faces, feature_centre, surface_in_words, tidy
+from ffr_prep.mesh.geometry.faces import Faces, feature_centre, several_solids, solids_of, surface_in_words, tidy
 from ffr_prep.mesh.geometry.regions import query_for
 from ffr_prep.report.mode_pictures import Camera, camera_of, draw_triad, off_screen, save_figure, shot
 
@@ -32,6 +32,7 @@ _COLOURS = (
     "#d8a48f",
 )
 _INK = "#222222"
+_SOLID = {True: ("solid",), False: ()}
 
 
 def face_lines(faces: Faces) -> Iterator[str]:
@@ -42,11 +43,11 @@ def face_lines(faces: Faces) -> Iterator[str]:
     of = f", which are {len(faces.features)} surfaces" if several else ""
     yield f"faces       {len(faces.faces)}{of}; extent {numbers(extent)} {unit}"
     rows = [_row(faces, feature) for feature in faces.features]
-    heads = ("faces", "what", f"centre [{unit}]", f"area [{unit}²]", "what to type")
-    widths = [max(len(row[k]) for row in [heads, *rows]) for k in range(4)]
+    heads = ("faces", *_SOLID[several_solids(faces)], "what", f"centre [{unit}]", f"area [{unit}²]", "what to type")
+    widths = [max(len(row[k]) for row in [heads, *rows]) for k in range(len(heads) - 1)]
     for row in [heads, *rows]:
         cells = "  ".join(f"{text:{width}}" for text, width in zip(row, widths, strict=False))
-        yield f"{cells}  {'  '.join(row[4:])}".rstrip()
+        yield f"{cells}  {row[-1]}".rstrip()
     for note in faces.notes:
         yield f"note        {note}"
 
@@ -55,9 +56,11 @@ def _row(faces: Faces, feature: Sequence[int]) -> tuple[str, ...]:
     first, scale = faces.faces[feature[0]], METRES[faces.unit]
     centre, area = feature_centre(faces, feature)
     about = [*(f"{name!r}" for name in dict.fromkeys([first.label, *first.groups]) if name), first.colour]
-    what = ", ".join([surface_in_words(faces, first), *(word for word in about if word)])
+    what = ", ".join([surface_in_words(faces, feature[0]), *(word for word in about if word)])
     at = numbers(tidy(centre / scale, faces.size / scale))
-    return "+".join(faces.faces[k].name for k in feature), what, at, f"{area / scale**2:.6g}", query_for(faces, feature)
+    names = "+".join(faces.faces[k].name for k in feature)
+    solids = [", ".join(solids_of(faces, feature))] if several_solids(faces) else []
+    return names, *solids, what, at, f"{area / scale**2:.6g}", query_for(faces, feature)
 
 
 def face_values(faces: Faces) -> dict[str, Any]:

@@ -8,6 +8,7 @@ from ffr_prep.common.arrays import Array
 from ffr_prep.common.brief import Brief
 
 METRES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254}
+HALF_TURN = 3.1  # [rad], a little less: a cylinder that goes as far around its axis from inside is a bore
 KINDS = ("plane", "cylinder", "cone", "sphere", "torus", "other")
 
 

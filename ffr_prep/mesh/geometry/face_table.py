@@ -15,6 +15,7 @@ from ffr_prep.common.arrays import Array
 from ffr_prep.mesh.geometry.face import Face
 
 _ANGLE = 1e-3  # within which directions are the same [rad]
+_GAP = 1.1  # [rad] between neighbours around an axis: coarse meshes have six points to the turn
 _NOWHERE = np.full(3, np.nan)
 
 
@@ -90,6 +91,25 @@ def features_of(table: FaceTable, points: Array, triangles: Sequence[Array]) -> 
     order = np.argsort(part, kind="stable")
     groups = np.split(order, np.flatnonzero(np.diff(part[order])) + 1)
     return tuple(tuple(of.tolist()) for of in sorted(groups, key=lambda of: int(of[0])))
+
+
+def arcs_of(table: FaceTable, features: Sequence[Sequence[int]], points: Array, triangles: Sequence[Array]) -> Array:
+    """(F,) how far the feature of each cylinder goes around its axis [rad]; NaN of other faces."""
+    found = np.full(len(table.kind), np.nan)
+    for feature in features:
+        first = feature[0]
+        if table.kind[first] == "cylinder" and np.isfinite(table.axis[first]).all():
+            own = points[np.unique(np.concatenate([triangles[k].ravel() for k in feature]))]
+            found[list(feature)] = _arc(own - table.point[first], table.axis[first])
+    return found
+
+
+def _arc(arms: Array, axis: Array) -> float:
+    """The angle about an axis that points around it span; the whole turn where they are nowhere far apart."""
+    across = np.linalg.svd(axis[None])[2][1:]
+    angles = np.sort(np.arctan2(*(arms @ across.T).T))
+    gap = float(np.diff(angles, append=angles[0] + 2 * np.pi).max())
+    return 2 * np.pi if gap < _GAP else 2 * np.pi - gap
 
 
 def _joined(pairs: Array, count: int) -> Array:

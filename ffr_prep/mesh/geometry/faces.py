@@ -14,8 +14,8 @@ import numpy as np
 
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.brief import Brief, Rows, numbers
-from ffr_prep.mesh.geometry.face import METRES, Face
-from ffr_prep.mesh.geometry.face_table import FaceTable, face_table, features_of
+from ffr_prep.mesh.geometry.face import HALF_TURN, METRES, Face
+from ffr_prep.mesh.geometry.face_table import FaceTable, arcs_of, face_table, features_of
 
 SHOWN = 60  # features that a table has
 
@@ -34,6 +34,7 @@ class Faces(Brief):
     size      : the diagonal of the box around all [m]
     features  : the numbers of the faces of each feature
     table     : the faces as arrays
+    arcs      : (F,) how far the feature of a cylinder goes around its axis [rad]; NaN of other faces
 
     >>> faces = fp.faces("plate.step")
     """
@@ -48,13 +49,16 @@ class Faces(Brief):
     size: float = field(init=False)
     features: tuple[tuple[int, ...], ...] = field(init=False)
     table: FaceTable = field(init=False)
+    arcs: Array = field(init=False)
 
     def __post_init__(self) -> None:
         size = float(np.linalg.norm(np.ptp(self.points, axis=0))) if len(self.points) else 0.0
         object.__setattr__(self, "size", size)
         table = face_table(self.faces, self.points, self.triangles, self.tolerance * self.size)
         object.__setattr__(self, "table", table)
-        object.__setattr__(self, "features", features_of(table, self.points, self.triangles))
+        features = features_of(table, self.points, self.triangles)
+        object.__setattr__(self, "features", features)
+        object.__setattr__(self, "arcs", arcs_of(table, features, self.points, self.triangles))
 
     def __len__(self) -> int:
         return len(self.faces)
@@ -124,19 +128,34 @@ def feature_in_words(of: Faces, feature: Sequence[int]) -> str:
     scale, first = METRES[of.unit], of.faces[feature[0]]
     names = f"; {'+'.join(of.faces[k].name for k in feature)}" if len(feature) > 1 else ""
     at = numbers(tidy(centre / scale, of.size / scale))
-    return f"{surface_in_words(of, first)}, centre {at} {of.unit}, area {area / scale**2:.5g} {of.unit}²{names}"
+    solids = f" of {', '.join(solids_of(of, feature))}" if several_solids(of) and not first.inner else ""
+    return f"{surface_in_words(of, feature[0])}{solids}, centre {at} {of.unit}, area {area / scale**2:.5g} {of.unit}²{names}"
 
 
-def surface_in_words(of: Faces, face: Face) -> str:
-    """Such as "bore r 6, axis (0, 0, 1)", lengths in the unit of the file."""
-    scale = METRES[of.unit]
+def several_solids(of: Faces) -> bool:
+    """Whether the faces are those of several solids, so that each has to tell its own."""
+    return len({solid for face in of.faces for solid in face.solids}) > 1
+
+
+def solids_of(of: Faces, feature: Sequence[int]) -> tuple[str, ...]:
+    """The names of the solids that a feature belongs to."""
+    return tuple(dict.fromkeys(solid for k in feature for solid in of.faces[k].solids))
+
+
+def surface_in_words(of: Faces, number: int) -> str:
+    """Such as "bore r 6, axis (0, 0, 1)" of the face of a number, lengths in the unit of the file."""
+    scale, face = METRES[of.unit], of.faces[number]
     if face.inner:
         return f"{face.kind} between {' and '.join(face.solids)}"
-    word = {("cylinder", True): "bore", ("cylinder", False): "cylinder"}.get((face.kind, bool(face.hollow)), face.kind)
+    word, arc = face.kind, float(of.arcs[number])
+    if face.kind == "cylinder" and face.hollow:
+        word = "bore" if arc >= HALF_TURN else "concave cylinder"
     if face.kind == "cone" and face.radius is not None:
         return f"{word} {np.degrees(face.radius):.5g}°, axis {direction(face)}"
     if face.radius is not None:
         word += f" r {face.radius / scale:.6g}" + (f" and {face.minor / scale:.6g}" if face.minor is not None else "")
+    if arc < 2 * np.pi:
+        word += f" over {np.degrees(arc):.0f}°"
     if face.axis is None:
         return word
     return f"{word}, {'normal' if face.kind == 'plane' else 'axis'} {direction(face)}"

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import fnmatch
 from collections.abc import Sequence
 
 import numpy as np
 
 from ffr_prep.common.arrays import Array
+from ffr_prep.mesh.geometry.face import HALF_TURN, Face
 from ffr_prep.mesh.geometry.faces import Faces
 from ffr_prep.mesh.geometry.region_words import Query
 
@@ -26,7 +28,9 @@ def misfits(faces: Faces, query: Query) -> Array:
     if query.kind != "face":
         wrong = wrong | (table.kind != kind_of(query))
     if query.kind == "bore":
-        wrong = wrong | (table.hollow == 0)
+        wrong = wrong | (table.hollow == 0) | (faces.arcs < HALF_TURN)
+    if query.solid:
+        wrong = wrong | ~np.array([of_solid(face, query.solid) for face in faces.faces], bool)
     parts = [np.where(wrong, np.inf, 0.0)]
     if query.radius is not None:
         off = np.abs(table.radius - query.radius) / max(_SAME * query.radius, near)
@@ -37,6 +41,12 @@ def misfits(faces: Faces, query: Query) -> Array:
     if query.at is not None:
         parts.append(off_surface(faces, query.at) / near)
     return np.asarray(np.max(np.nan_to_num(parts, nan=np.inf), axis=0))
+
+
+def of_solid(face: Face, name: str) -> bool:
+    """Whether the face belongs to a solid of this name, which may be a pattern, or that of all instances of a part."""
+    known = [word for solid in face.solids for word in (solid, solid.rpartition("#")[0])]
+    return any(fnmatch.fnmatchcase(word, name) for word in known)
 
 
 def kind_of(query: Query) -> str:

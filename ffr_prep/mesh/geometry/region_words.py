@@ -11,6 +11,7 @@
               | x=LENGTH | y=LENGTH | z=LENGTH  plane across an axis, at this place
               | normal=DIRECTION | axis=DIRECTION          x, -z, or three numbers
               | colour=#rrggbb                  as the file has it
+              | solid=NAME                      of this solid; 'NAME' where it has blanks; may be a pattern
               | at point                        the surface, or its axis, passes there
               | near point                      of those that fit the feature nearest to it
     point     = LENGTH,LENGTH,LENGTH
@@ -41,6 +42,7 @@ _CONDITION = re.compile(
     rf"\s*(?:(?P<key>[rdxyz])\s*=\s*(?P<length>{_LENGTH})"
     rf"|(?P<turned>normal|axis)\s*=\s*(?P<direction>[-+]?[xyz](?!\w)|\(?\s*{_NUMBER}\s*,\s*{_NUMBER}\s*,\s*{_NUMBER}\s*\)?)"
     rf"|colou?r\s*=\s*(?P<colour>#[0-9a-fA-F]{{6}})"
+    rf"|solid\s*=\s*(?P<solid>'[^']+'|[^\s,']+)"
     rf"|(?P<place>at|near)\s+(?P<point>{_POINT}))\s*,?"
 )
 
@@ -60,6 +62,7 @@ class Query:
     normal: Point | None = None
     axis: Point | None = None
     colour: str = ""
+    solid: str = ""
     at: Point | None = None
     near: Point | None = None
 
@@ -131,6 +134,8 @@ def _condition(found: re.Match[str], unit: str) -> tuple[str, object]:
         return found["turned"], _direction(found["direction"])
     if found["colour"]:
         return "colour", found["colour"].lower()
+    if found["solid"]:
+        return "solid", found["solid"].strip("'")
     inner = re.fullmatch(_POINT, found["point"])
     assert inner is not None  # it was matched as a part
     return found["place"], _point(inner.groups(), unit)

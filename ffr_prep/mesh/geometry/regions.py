@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import fnmatch
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -12,7 +13,7 @@ from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 from ffr_prep.common.registry import choice
 from ffr_prep.mesh.geometry.face import METRES, Face
-from ffr_prep.mesh.geometry.faces import Faces, feature_centre, feature_in_words, tidy
+from ffr_prep.mesh.geometry.faces import Faces, feature_centre, feature_in_words, several_solids, solids_of, tidy
 from ffr_prep.mesh.geometry.misfits import across, fitting, kind_of, misfits, nearest, off_surface
 from ffr_prep.mesh.geometry.region_words import Names, Query, is_query, parsed
 
@@ -172,12 +173,21 @@ def _offers(faces: Faces, features: Sequence[Sequence[int]]) -> str:
 def query_for(faces: Faces, feature: Sequence[int]) -> str:
     """A query that finds the faces of a feature and no others, or else their names."""
     wanted = set(feature)
-    for text in _candidates(faces, feature):
+    for text in _with_solid(faces, feature, _candidates(faces, feature)):
         (term,) = parsed(text, faces.unit)
         hits = _meant(faces, term) if isinstance(term, Query) else [_by_name(faces, text)]
         if len(hits) == 1 and set(hits[0]) == wanted:
             return text
     return "+".join(faces.faces[k].name for k in feature)
+
+
+def _with_solid(faces: Faces, feature: Sequence[int], queries: Sequence[str]) -> list[str]:
+    """Queries, and behind them the same with the solid of a feature, where there are several and this has one."""
+    solids = solids_of(faces, feature)
+    if len(solids) != 1 or not several_solids(faces) or set("'+:@") & set(solids[0]):
+        return list(queries)
+    named = f"solid={solids[0]}" if re.fullmatch(r"[^\s,'*?\[]+", solids[0]) else f"solid='{solids[0]}'"
+    return [*queries, *(f"{text} {named}" for text in queries if is_query(text))]
 
 
 def _candidates(faces: Faces, feature: Sequence[int]) -> list[str]:

@@ -15,14 +15,16 @@ from places import MESHES, REFERENCE
 import ffr_prep as fp
 from ffr_prep.common.errors import InputError
 from ffr_prep.mesh.geometry.faces import feature_centre
-from ffr_prep.mesh.geometry.region_words import Names, Query, parsed
+from ffr_prep.mesh.geometry.region_words import Names, Query, is_query, parsed
 from ffr_prep.mesh.geometry.regions import found, query_for
 from ffr_prep.mesh.geometry.skin import mesh_faces, with_regions
 from ffr_prep.mesh.geometry.step_text import face_labels
 from ffr_prep.mesh.mesh import check_mesh, read_mesh, region_nodes
+from ffr_prep.report.faces import face_lines
 from ffr_prep.structures.frame import group_nodes
 
 PLATE = REFERENCE / "plate.step"  # four bores, by CadQuery
+PINNED = REFERENCE / "pinned_plate.step"  # by OpenCASCADE: a plate with two bores, and in them the same pin twice
 
 
 @pytest.fixture(scope="module")
@@ -392,10 +394,73 @@ def test_cones_with_a_tip_are_meshed(tmp_path):
 def test_names_are_not_told_where_they_may_be_of_other_faces(parts):
     text = parts["every surface"].read_text().replace("ADVANCED_FACE(''", "ADVANCED_FACE('lid'", 1)
     kinds = [face.kind for face in faces_of(parts["every surface"]).faces]
-    assert face_labels(text, kinds).count("lid") == 1
-    assert set(face_labels(text, kinds[:-1])) == {""}
-    assert set(face_labels(text, ["sphere"] * len(kinds))) == {""}
+    assert face_labels(text, [kinds]).count("lid") == 1
+    assert set(face_labels(text, [kinds[:-1]])) == {""}
+    assert set(face_labels(text, [["sphere"] * len(kinds)])) == {""}
     assert face_labels("#1 = ADVANCED_FACE(" + "'" * 200_001, []) == []
+
+
+def test_instances_of_a_part_have_names_of_their_own():
+    """Solids, and the names of faces, which the file has once for both instances; that of the bore, not that of its solid."""
+    faces = fp.faces(PINNED)
+    assert [face.solids for face in faces.faces] == [("pin#1",)] * 3 + [("pin#2",)] * 3 + [("base",)] * 8
+    assert [face.label for face in faces.faces if face.label] == ["end A", "end A", "left bore"]
+    assert "base   bore r 5" in "\n".join(face_lines(faces))
+    ends = {face.name for face in faces.faces if face.label == "end A"}
+    assert set(fp.found_faces(faces, "end A")) == ends
+    (pin,) = fp.found_faces(faces, "cylinder r=5mm solid=pin#2")
+    (known,) = [face for face in faces.faces if face.name == pin]
+    assert known.hollow is False
+    np.testing.assert_allclose(known.centre, [0.02, 0, 0], atol=1e-12)
+    assert len(fp.found_faces(faces, "all plane solid=pin")) == 4  # of all instances
+    assert len(fp.found_faces(faces, "all plane solid='pi*'")) == 4
+    for (
+        feature
+    ) in faces.features:  # what is typed finds the feature and no other, in spite of a pin as large as its bore
+        assert set(found(faces, query_for(faces, feature))) == set(feature)
+    assert is_query(query_for(faces, [0]))
+
+
+def test_one_instance_is_a_body_and_all_have_a_material():
+    assert set(fp.read_mesh(PINNED, size=5, solids=["pin#2"]).volume_groups) == {"volume_2", "pin"}
+    glued = fp.read_mesh(PINNED, size=5, glue=True)
+    assert {"pin", "pin#1", "pin#2", "base"} <= set(glued.volume_groups)
+    both = np.union1d(glued.volume_groups["pin#1"], glued.volume_groups["pin#2"])
+    np.testing.assert_array_equal(np.sort(glued.volume_groups["pin"]), both)
+    with pytest.raises(InputError, match="there are: 'pin#1', 'pin#2', 'base'"):
+        fp.faces(PINNED, solids=["bolt"])
+
+
+def test_names_of_faces_are_not_told_of_glued_solids():
+    """Their faces are no longer those of the file."""
+    assert {face.label for face in fp.faces(PINNED, glue=True).faces} == {""}
+
+
+def rounded_in_a_corner(occ):
+    """An angle with a fillet of 6 mm in its corner, a bore of 6 mm and a slot whose ends are half bores of 4 mm."""
+    flat, wall, bead = occ.addBox(0, 0, 0, 80, 30, 8), occ.addBox(0, 0, 0, 8, 30, 40), occ.addBox(8, 0, 8, 6, 30, 6)
+    filled, _ = occ.cut([(3, bead)], [(3, occ.addCylinder(14, 0, 14, 0, 30, 0, 6))])
+    body, _ = occ.fuse([(3, flat)], [(3, wall), *filled])
+    ends = [(3, occ.addCylinder(x, 15, 0, 0, 0, 8, 4)) for x in (50, 66)]
+    occ.cut(body, [(3, occ.addCylinder(30, 15, 0, 0, 0, 8, 6)), *ends, (3, occ.addBox(50, 11, 0, 16, 8, 8))])
+
+
+def test_a_fillet_is_no_bore(tmp_path):
+    """A cylinder from inside is a bore from half a turn on, in geometries and on meshes; `cylinder` means all."""
+    path = written(rounded_in_a_corner, tmp_path / "angle.step")
+    mesh = replace(read_mesh(path, size=3.0), drawn=(), face_groups={})
+    for faces in (fp.faces(path), mesh_faces(mesh)):
+        arcs = {
+            (round(faces.faces[k].radius * 1e3), round(math.degrees(faces.arcs[k])))
+            for k in np.flatnonzero(faces.arcs > 0)
+        }
+        assert {arc for arc in arcs if arc[0] in (4, 6)} == {(6, 90), (6, 360), (4, 180)}
+        (bore,) = {tuple(of) for of in faces.features if set(of) & set(found(faces, "bore r=6mm"))}
+        assert np.degrees(faces.arcs[bore[0]]) == 360
+        assert len(found(faces, "all bore r=4mm")) >= 2
+        with pytest.raises(InputError, match="finds 2 cylinders"):
+            found(faces, "cylinder r=6mm")
+        assert any("concave cylinder r 6 over 90°" in line for line in face_lines(faces))
 
 
 # ---- models without faces -------------------------------------------------------------------------------------------
