@@ -168,6 +168,10 @@ def plot(result: Path, names: tuple[str, ...], output: Path, title: str | None, 
 @click.option("--limit", type=float, help="End of the colour bar [m, Pa]; default: the largest value of the film.")
 @click.option("--plot", "plots", multiple=True, metavar="NAME", help="Of .html: a history beside the motion; repeat.")
 @click.option("--trace", "traces", multiple=True, metavar="MARKER", help="Draw the path of a marker; repeat.")
+@click.option(
+    "--arrow", "arrows", multiple=True, metavar="NAME",
+    help="Draw the forces and moments of a joint, force or motor; '*' of all; repeat.",
+)  # fmt: skip
 def animate(
     result: Path,
     output: Path,
@@ -177,6 +181,7 @@ def animate(
     limit: float | None,
     plots: tuple[str, ...],
     traces: tuple[str, ...],
+    arrows: tuple[str, ...],
 ) -> None:
     """A film of RESULT: deformed bodies, coloured by elastic displacement or stress, with the undeformed ghost.
 
@@ -193,7 +198,7 @@ def animate(
     factor: float | str = scale if scale == "auto" else _number(scale)
     loaded = load_result(result)
     how: dict[str, Any] = {"scale": factor, "duration": duration, "colour": colour, "limit": limit}
-    animation.animate(loaded, output, plots=plots, traces=traces, **how)
+    animation.animate(loaded, output, plots=plots, traces=traces, arrows=arrows, **how)
     click.echo(f"film     {output}")
 
 

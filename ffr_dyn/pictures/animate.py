@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
+from ffr_dyn.pictures.arrows import loads_named, with_arrows
 from ffr_dyn.pictures.connections import connections
 from ffr_dyn.pictures.film import Camera, Film, camera_for, film, film_at
 from ffr_dyn.pictures.shades import shades
@@ -53,6 +54,7 @@ def animate(
     limit: float | None = None,
     traces: Iterable[str] = (),
     plots: Iterable[str] = (),
+    arrows: Iterable[str] = (),
 ) -> Viewer:
     """A film of the bodies of a result: the viewer, which a notebook shows; written where a path is given.
 
@@ -68,6 +70,8 @@ def animate(
     limit    : end of the colour bar [m, Pa or 1]; the largest value of the film when not given
     traces   : markers ("rod.small_eye") whose paths are drawn
     plots    : quantities ("crank_pin.force", "rod.tip.position.x") that the viewer plots beside the motion
+    arrows   : joints, forces and motors ("crank_pin", "*") whose forces and moments are drawn, in pictures and, at the
+               start, in the viewer, which can show all
 
     An existing file is replaced only by a complete new one. Raises InputError for settings or a result that cannot be
     drawn, ComputationError when this machine cannot render.
@@ -82,9 +86,14 @@ def animate(
     title, view = str(result.attributes.get("title", "")), camera and camera.axes() and camera
     how: dict[str, Any] = {"scale": scale, "traces": tuple(traces), "colour": colour, "limit": limit}
     playing, frames = _pace(result, fps, duration)
-    make = partial(_page, result, title, view, playing, tuple(plots), how)
+    plots, arrows = tuple(plots), tuple(arrows)
+    make = partial(_page, result, title, view, playing, plots, arrows, how)
     if target and write:
-        shown = film(result, frames, **how)
+        if plots:
+            raise InputError(
+                f"{target}: histories are plotted beside the motion on a page; write .html, or leave out {plots[0]!r}"
+            )
+        shown = with_arrows(film(result, frames, **how), connections(result), result.time, arrows)
         with replacing(target) as part:
             write(_Show(shown, playing / frames, view or camera_for(shown), size), part)
         return Viewer(make, title)
@@ -96,13 +105,21 @@ def animate(
 
 
 def _page(
-    result: Result, title: str, camera: Camera | None, playing: float, plots: tuple[str, ...], how: dict[str, Any]
+    result: Result,
+    title: str,
+    camera: Camera | None,
+    playing: float,
+    plots: tuple[str, ...],
+    arrows: tuple[str, ...],
+    how: dict[str, Any],
 ) -> str:
     from ffr_dyn.pictures.page import Shown, page  # here, because matplotlib is slow to load
 
     result = _thinned(result)
     shown = film_at(result, result.time, **how)
-    content = Shown(shown, connections(result), shades(shown, how["colour"]), title, result, plots)
+    beside = connections(result)
+    seen = loads_named(beside, arrows)
+    content = Shown(shown, beside, shades(shown, how["colour"]), title, result, plots, arrows=seen)
     return page(content, camera or camera_for(shown), playing)
 
 

@@ -14,6 +14,7 @@ from ffr_prep.body import displacements, some_points
 from ffr_prep.common.arrays import Array
 
 _ROUNDING = 1e-9  # of the largest force or moment, up to which there is none
+_NEGLIGIBLE = 1e-4  # moment over the largest force times the size of the picture
 _POINT, _SURFACE = 0.25, 0.12  # lengths of the longest arrows, of the size of the picture
 _VECTORS = (("force", "N"), ("moment", "N m"))
 
@@ -102,13 +103,23 @@ class Connections:
         """All that is drawn as arrows."""
         return (*self.arrows, *self.spread)
 
+    def least(self, load: ArrowShown | SpreadShown, size: float) -> float:
+        """What the measure of a moment at a point is at least [N m]: beside the forces of the picture less is nothing."""
+        if isinstance(load, SpreadShown) or load.unit != "N m":
+            return 0.0
+        return _NEGLIGIBLE * size * max((other.largest for other in self.arrows if other.unit == "N"), default=0.0)
+
     def lengths(self, size: float) -> Iterator[tuple[ArrowShown | SpreadShown, float]]:
         """Every load, and with which length one of its unit is drawn [m] in a picture of this size [m].
 
         Forces at points have one measure, moments one; each load on a surface has its own.
         """
+        longest = {
+            unit: max((arrow.largest for arrow in self.arrows if arrow.unit == unit), default=0.0)
+            for _, unit in _VECTORS
+        }
         for arrow in self.arrows:
-            yield arrow, _POINT * size / max(other.largest for other in self.arrows if other.unit == arrow.unit)
+            yield arrow, _POINT * size / max(longest[arrow.unit], self.least(arrow, size))
         for load in self.spread:
             yield load, _SURFACE * size / (load.largest or 1.0)
 

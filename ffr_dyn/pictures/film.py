@@ -126,7 +126,7 @@ class Film:
     traces     : by marker, its path over all rows of the result (T, 3) [m]
     colouring  : what the colours of flexible bodies show; None leaves them plain
     marks      : words at points (3,) [m] that do not move
-    forces, moments : arrows that do not move, from and to (N, 2, 3) [m]
+    forces, moments : arrows in each picture, from and to (F, N, 2, 3) [m]
     heading    : words in the corner of the picture, instead of time and scale
     low, high  : (3,) corners of a box that holds the whole motion [m]
     """
@@ -142,8 +142,8 @@ class Film:
     colouring: Colouring | None = None
     marks: dict[str, Array] = field(default_factory=dict)
     heading: str = ""
-    forces: Array = field(default_factory=lambda: np.zeros((0, 2, 3)))
-    moments: Array = field(default_factory=lambda: np.zeros((0, 2, 3)))
+    forces: Array = field(default_factory=lambda: np.zeros((0, 0, 2, 3)))
+    moments: Array = field(default_factory=lambda: np.zeros((0, 0, 2, 3)))
 
     @property
     def size(self) -> float:

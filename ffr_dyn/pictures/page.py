@@ -52,6 +52,7 @@ class Shown:
     plots    : names of the components that are plotted at the start
     faint    : names of the bodies that are translucent
     boxes    : what is switched on at the start: edges, ghost, names, frames, markers, forces
+    arrows   : names of the loads whose arrows are, where not all forces are
     moments  : words in place of the time at each row
     """
 
@@ -64,6 +65,7 @@ class Shown:
     faint: frozenset[str] = frozenset()
     boxes: tuple[str, ...] = ("edges",)
     moments: tuple[str, ...] = ()
+    arrows: frozenset[str] = frozenset()
 
 
 def page(shown: Shown, camera: Camera, seconds: float) -> str:
@@ -176,8 +178,8 @@ def _beside(shown: Shown, numbers: _Numbers) -> Item:
         {
             "name": load.name,
             "unit": load.unit,
-            "shown": "forces" in shown.boxes,
-            "largest": load.largest,
+            "shown": "forces" in shown.boxes or load.name in shown.arrows,
+            "largest": max(load.largest, beside.least(load, shown.film.size)),
             **(_spread(load, numbers) if isinstance(load, SpreadShown) else _at_point(load, numbers)),
         }
         for load in beside.loads

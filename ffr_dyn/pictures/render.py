@@ -145,8 +145,7 @@ def _build(plotter: Any, shown: Film, faint: frozenset[str]) -> list[Update]:
     for path, colour in zip(shown.traces.values(), TRACE_COLOURS * len(shown.traces), strict=False):
         plotter.add_mesh(pv.lines_from_points(path), color=colour, line_width=2.5, lighting=False)
     for arrows, colour, heads in ((shown.forces, _FORCE, 1), (shown.moments, _MOMENT, 2)):
-        for begin, end in arrows[np.any(arrows[:, 0] != arrows[:, 1], axis=1)]:
-            plotter.add_mesh(_arrow(begin, end, heads), color=colour, **_MATTE)
+        updates += [_arrow(plotter, arrows[:, k], colour, heads) for k in range(arrows.shape[1])]
     if shown.marks:
         _mark(plotter, shown)
     plotter.add_axes(line_width=2, color=_INK, viewport=(0.0, 0.0, 0.16, 0.2))
@@ -276,15 +275,30 @@ def _tubes(plotter: Any, link: Link, colour: str, faint: bool) -> Update:
     return update
 
 
-def _arrow(begin: Array, end: Array, heads: int) -> Any:
-    """An arrow between two points, of a moment with two heads."""
-    along = end - begin
-    length = float(np.linalg.norm(along))
-    thick = {"shaft_radius": 0.015, "tip_radius": 0.05, "tip_length": 0.16}
-    found = pv.Arrow(start=begin, direction=along, scale=length, **thick)
+def _arrow(plotter: Any, ends: Array, colour: str, heads: int) -> Update:
+    """An arrow between two points in each picture, ends (F, 2, 3) [m]; of a moment with two heads."""
+    actor = plotter.add_mesh(_unit_arrow(heads), color=colour, **_MATTE)
+
+    def update(frame: int) -> None:
+        begin, end = ends[frame]
+        length = float(np.linalg.norm(end - begin))
+        actor.SetVisibility(length > 0.0)
+        if length > 0.0:
+            along = (end - begin) / length
+            across = np.linalg.svd(along[None])[2][1]
+            matrix = np.eye(4)
+            matrix[:3, :3] = length * np.stack([along, across, np.cross(along, across)], axis=1)
+            matrix[:3, 3] = begin
+            actor.user_matrix = matrix
+
+    return update
+
+
+def _unit_arrow(heads: int) -> Any:
+    """An arrow of length one along x."""
+    found = pv.Arrow(shaft_radius=0.015, tip_radius=0.05, tip_length=0.16)
     for k in range(1, heads):
-        head = {"height": 0.16 * length, "radius": 0.05 * length, "resolution": 20}
-        found = found.merge(pv.Cone(center=end - (0.08 + 0.13 * k) * along, direction=along, **head))
+        found = found.merge(pv.Cone(center=(0.92 - 0.13 * k, 0, 0), height=0.16, radius=0.05, resolution=20))
     return found
 
 

@@ -288,7 +288,7 @@ def _marked(seen: SceneView, film: Film) -> Film:
         for turns in (True, False)
     )
     paths = {**film.traces, **axes}
-    return replace(film, marks=marks, traces=paths, heading=heading, forces=forces, moments=moments)
+    return replace(film, marks=marks, traces=paths, heading=heading, forces=forces[None], moments=moments[None])
 
 
 def _merged(places: Iterable[tuple[str, Array]], size: float) -> Iterator[tuple[str, Array]]:

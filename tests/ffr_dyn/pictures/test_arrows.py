@@ -13,11 +13,13 @@ from test_page import Content
 import ffr_dyn as fd
 import ffr_prep as fp
 from ffr_dyn.functions.rotation import rotation_matrix
-from ffr_dyn.pictures.connections import connections
+from ffr_dyn.pictures.arrows import loads_named, with_arrows
+from ffr_dyn.pictures.connections import ArrowShown, Connections, connections
 from ffr_dyn.pictures.film import body_points, film_at
 from ffr_dyn.pictures.scene_view import scene_view
 from ffr_dyn.results.file import load_result, save_result
 from ffr_dyn.results.result import Result
+from ffr_prep.common.errors import InputError
 
 ON_I = np.array([[0.0, 1, 0], [0, 0, 1], [1, 0, 0]]).T  # axes of the bushing: y, z, x
 SIZE = (1.0, 0.2, 0.02)
@@ -88,6 +90,65 @@ def drawn(row: int) -> np.ndarray:
     """(P, 3) the points of the blade in global axes."""
     (solid,) = (of for of in film_at(run(), run().time).solids if of.name == "blade")
     return solid.R[row] + body_points(solid, row, 1.0) @ solid.A[row].T
+
+
+# ---- films as pictures ----------------------------------------------------------------------------------------------
+
+
+def test_arrows_of_a_film_are_those_of_the_rows_and_between_them_in_between():
+    beside, rows = connections(run()), run().time
+    shown = film_at(run(), np.array([rows[3], 0.5 * (rows[3] + rows[4]), rows[-1]]))
+    drawn = with_arrows(shown, beside, rows, ["wind", "motor.torque"])
+    (wind,), (torque,) = (
+        [(load, length) for load, length in beside.lengths(shown.size) if load.name == name]
+        for name in ("wind", "motor.torque")
+    )
+    assert (drawn.forces.shape, drawn.moments.shape) == ((3, 16, 2, 3), (3, 1, 2, 3))
+    for arrows, (load, length) in ((drawn.forces, wind), (drawn.moments, torque)):
+        third, fourth, last = (np.stack(load.ends(row, length), axis=1) for row in (3, 4, -1))
+        np.testing.assert_allclose(arrows, [third, 0.5 * (third + fourth), last], atol=1e-12)
+    assert (drawn.low <= drawn.forces.min(axis=(0, 1, 2))).all()
+    assert (drawn.high >= drawn.forces.max(axis=(0, 1, 2))).all()
+
+
+def test_arrows_are_asked_for_by_name_or_pattern():
+    beside = connections(run())
+    assert loads_named(beside, ()) == frozenset()
+    assert loads_named(beside, ["*"]) == {load.name for load in beside.loads}
+    assert loads_named(beside, ["hinge"]) == {load.name for load in beside.loads if load.of == "hinge"}
+    with pytest.raises(InputError, match="no arrow for 'hnge'; did you mean 'hinge'"):
+        loads_named(beside, ["hnge"])
+
+
+def test_a_film_of_pictures_has_the_arrows_that_are_asked_for_and_no_others(tmp_path):
+    """In the colour of forces, which nothing else has here; on the page they are switched on."""
+    counts = []
+    for arrows in ((), ("wind",)):
+        fd.animate(run(), tmp_path / "a.gif", arrows=arrows, scale=1.0, duration=0.2, fps=25, size=(640, 480), colour="body")
+        with Image.open(tmp_path / "a.gif") as picture:
+            red, green, blue = np.moveaxis(np.asarray(picture.convert("RGB")).astype(int), -1, 0)
+        counts.append(int(((red > 90) & (red > 1.4 * green) & (green > 1.4 * blue)).sum()))
+    assert counts[0] == 0
+    assert counts[1] > 20
+    page = fd.animate(run(), arrows=["wind"])
+    assert {one["name"] for one in Content(page.text).about["arrows"] if one["shown"]} == loads_named(
+        connections(run()), ["wind"]
+    )
+    with pytest.raises(InputError, match="histories are plotted beside the motion on a page"):
+        fd.animate(run(), tmp_path / "b.gif", plots=["mount.force"])
+
+
+def test_moments_that_no_force_here_could_miss_are_not_drawn_long():
+    """A hinge has some 1e-7 N m by rounding about axes that nothing loads, and no other moment is there to measure it by."""
+    at = np.zeros((2, 3))
+    force, moment = (
+        ArrowShown("h", name, unit, at, np.full((2, 3), size))
+        for name, unit, size in (("f", "N", 7.0), ("m", "N m", 1e-7))
+    )
+    lengths = {load.name: length * load.largest for load, length in Connections((), (force, moment), {}).lengths(0.1)}
+    assert lengths["f"] == pytest.approx(0.025)
+    assert lengths["m"] < 1e-4
+    assert dict(Connections((), (moment,), {}).lengths(0.1))[moment] * moment.largest == pytest.approx(0.025)
 
 
 # ---- loads on surfaces ----------------------------------------------------------------------------------------------
