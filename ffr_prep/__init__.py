@@ -34,7 +34,7 @@ from ffr_prep.common.front_door import front_door
 # No name here is that of a room, whose import would put the room in its place.
 _BY_MODULE = {
     "ffr_prep.body": "BeamForces BodyError Damping FlexibleBody FrameMarker Interface MeanAxisForm Surface damped immovable "
-    "load_body mean_axis_form rigid_body save_body truncated with_point",
+    "load_body mean_axis_form rigid_body save_body truncated units_doubts with_point",
     "ffr_prep.common.errors": "ComputationError InputError",
     "ffr_prep.common.registry": "Setting",
     "ffr_prep.interchange.formats": "register_exchange_format ExchangeFormat",
@@ -103,7 +103,7 @@ if TYPE_CHECKING:  # the same names, for editors and checkers of types
         Interface as Interface, MeanAxisForm as MeanAxisForm, Surface as Surface, damped as damped, immovable as immovable,
         load_body as load_body,
         mean_axis_form as mean_axis_form, rigid_body as rigid_body, save_body as save_body, truncated as truncated,
-        with_point as with_point,
+        units_doubts as units_doubts, with_point as with_point,
     )
     from ffr_prep.common.errors import ComputationError as ComputationError, InputError as InputError
     from ffr_prep.common.registry import Setting as Setting

@@ -28,11 +28,12 @@ from ffr_dyn.scene.scene import Scene, altered, require_scene
 from ffr_dyn.scene.sensors import StressMeasurement
 from ffr_dyn.variants.mean_axis import in_mean_axis_frames
 from ffr_dyn.variants.plane import obstacles, planar_forms
-from ffr_prep.body import mesh_doubt, steady_stress_doubt
+from ffr_prep.body import mesh_doubt, steady_stress_doubt, units_doubts
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.brief import Brief
 from ffr_prep.common.errors import InputError
 
+_MOST_GRAVITY = 1000.0  # m/s^2; in mm/s^2 that of the Earth is 9810
 SHIFTED = 1e-6  # m, rad, from where it is told that assembly moved a body
 RELAXATION = 1e-6  # of dependent rows, relative: rounding over it is what their reactions are uncertain by
 BRANCHES = (
@@ -112,11 +113,17 @@ def assemble(scene: Scene, *, time: float = 0.0) -> Assembled:
 
 
 def body_doubts(scene: Scene) -> list[str]:
-    """Notes on bodies whose mesh is too coarse, and on those whose stress is measured and lacks that of their inertia."""
+    """Notes on bodies: a mesh too coarse, a measured stress that lacks that of inertia, numbers that cannot be meant."""
     measured = {of.body for of in scene.measurements if isinstance(of, StressMeasurement)}
     doubts = [(body.name, mesh_doubt(body.model.provenance)) for body in scene.bodies]
     doubts += [(b.name, steady_stress_doubt(b.model.provenance)) for b in scene.bodies if b.name in measured]
-    return [f"body {name!r}: {doubt}" for name, doubt in doubts if doubt]
+    doubts += [(body.name, doubt) for body in scene.bodies for doubt in units_doubts(body.model)]
+    return [f"body {name!r}: {doubt}" for name, doubt in doubts if doubt] + _gravity_doubts(scene)
+
+
+def _gravity_doubts(scene: Scene) -> list[str]:
+    size = float(np.linalg.norm(scene.gravity))
+    return [f"gravity is {size:.4g} m/s^2: is it in mm/s^2?"] if size > _MOST_GRAVITY else []
 
 
 def shifted(scene: Scene, place: Layout, guess: Array, x: Array) -> list[str]:

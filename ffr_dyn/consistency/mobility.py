@@ -99,7 +99,7 @@ def mobility(scene: Scene, *, time: float = 0.0, drivers: bool = True) -> Mobili
     M = total_mass_matrix(flat, place, assembled.x)
     Z = free_motions(jacobian[:, rigid], M[np.ix_(rigid, rigid)])
     motions = tuple(_motions(flat, place, assembled.x, assembled.v, rigid, Z))
-    doubts = tuple(note for note in assembled.notes if note.startswith("body "))
+    doubts = tuple(note for note in assembled.notes if note.startswith(("body ", "gravity ")))
     elastic = sum(place.n)
     free, plane = assembled.degrees_of_freedom, whole.scene.plane
     return Mobility(free, elastic, plane, whole.computed, motions, assembled.redundant, over, doubts)

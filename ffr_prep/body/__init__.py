@@ -43,6 +43,7 @@ from ffr_prep.body.second_order import (
     values,
 )
 from ffr_prep.body.steady_stress import STEADY_STRESS, left_out_stress, steady_stress_doubt
+from ffr_prep.body.units_doubt import units_doubts
 
 __all__ = [
     "MESH_ERROR",
@@ -90,6 +91,7 @@ __all__ = [
     "surface_arrays",
     "surface_of",
     "truncated",
+    "units_doubts",
     "values",
     "with_damping",
     "with_point",

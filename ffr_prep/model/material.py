@@ -25,6 +25,10 @@ from ffr_prep.common.reading import read_toml
 Rows = tuple[tuple[float, ...], ...]
 
 _LIGHTEST = 1e-3  # kg/m^3; aerogels have about 1
+_FOAM, _HEAVIEST = 10.0, 2.3e4  # kg/m^3
+_FASTEST = 3e4  # m/s, sqrt(E/rho); diamond has 18000
+_SLOWEST, _SLOWEST_DENSE = 1.0, 30.0  # of gels and foams, and of what is denser than _DENSE
+_DENSE = 2000.0  # kg/m^3, of which no gel is
 _ASYMMETRY = 1e-6  # of a matrix that was typed or printed with six digits
 
 
@@ -171,6 +175,30 @@ def _check_density(name: str, rho: float) -> None:
             f"material {name!r}: density rho is {rho:g} kg/m^3, less than any solid's, as in tonnes and "
             "millimetres; give SI units (steel: E=2.1e11,nu=0.3,rho=7850)"
         )
+
+
+def density_doubts(rho: float) -> list[str]:
+    """What is doubtful about a density [kg/m^3], in words: it may be in other units."""
+    if rho < _FOAM:
+        return [f"its density is {rho:g} kg/m^3, that of the lightest foams: is it in g/cm^3? Steel has 7850 kg/m^3"]
+    if rho > _HEAVIEST:
+        return [
+            f"its density is {rho:g} kg/m^3, more than that of any solid: is it in another unit? Steel has 7850 kg/m^3"
+        ]
+    return []
+
+
+def material_doubts(material: Material | AnisotropicMaterial) -> list[str]:
+    """What is doubtful about a material, in words: its density, and its stiffness against that."""
+    E, rho = material.engineering_constants()[0], material.rho
+    slowest = _SLOWEST if rho < _DENSE else _SLOWEST_DENSE
+    speed = math.sqrt(E / rho)
+    off = not slowest <= speed <= _FASTEST and E > 0
+    said = [
+        f"sqrt(E/rho) is {speed:.2g} m/s with E = {E:.3g} Pa and rho = {rho:.3g} kg/m^3, of solids some 10 to 18000 m/s: are "
+        "both in SI units? Steel has E=2.1e11,rho=7850"
+    ]
+    return [f"material {material.name!r}: {doubt}" for doubt in [*density_doubts(rho), *(said if off else [])]]
 
 
 def _check_elasticity(name: str, C: Array) -> None:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from ffr_prep.body import Damping, FlexibleBody, Interface, mesh_doubt, steady_stress_doubt, with_damping
+from ffr_prep.body import Damping, FlexibleBody, Interface, mesh_doubt, steady_stress_doubt, units_doubts, with_damping
 from ffr_prep.body.provenance import described
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError, InputError
@@ -184,6 +184,8 @@ def _reduced(model: Model, request: Request, progress: Stages, advance: Advance)
         damping=model.damping(basis.Z),
         **vars(integrals),
     )
+    warnings = [*made.provenance["warnings"], *units_doubts(made)]
+    made = replace(made, provenance={**made.provenance, "warnings": list(dict.fromkeys(warnings))})
     return _with_held_body(made, model, body, progress)
 
 

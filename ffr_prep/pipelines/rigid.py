@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ffr_prep.body import FlexibleBody, Surface, rigid_body
+from ffr_prep.body import FlexibleBody, Surface, rigid_body, units_doubts
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 from ffr_prep.common.reading import reading
@@ -23,7 +23,7 @@ from ffr_prep.mesh.gmsh_files import skin_from_gmsh
 from ffr_prep.mesh.mesh import Mesh, cad_settings, check_mesh, check_request, read_mesh
 from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.invariants import inertia_integrals
-from ffr_prep.model.material import Material
+from ffr_prep.model.material import Material, density_doubts
 from ffr_prep.solids.assembly import assemble
 
 
@@ -54,8 +54,7 @@ def rigid_part(
     >>> crank = fp.rigid_part("crank.step", 7850.0, [fp.InterfaceRegion("pin", "cylinder r=6mm at 0,0,0")])
     """
     path, numbers = Path(path), dict(numbers or {})
-    if not 0 < density < np.inf:
-        raise InputError(f"the density is {density} kg/m^3; it must be positive")
+    Material("of the part", 1.0, 0.0, density)  # refuses what no solid has
     check_request(path, unit, None, numbers, 1)
     faces, solid = _geometry(path, unit, numbers, solids)
     points = {interface.name: _place(faces, interface) for interface in interfaces}
@@ -71,7 +70,8 @@ def rigid_part(
     )
     regions = [{"name": i.name, "region": i.region or i.name} for i in interfaces if i.point is None]
     source = {"file": path.name, "unit": faces.unit, "density": density}
-    made = {"kind": "rigid", "source": source, "interfaces": regions, "notes": list(faces.notes)}
+    notes = [*faces.notes, *density_doubts(density), *units_doubts(body)]
+    made = {"kind": "rigid", "source": source, "interfaces": regions, "notes": notes}
     return replace(body, provenance=made)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -16,6 +16,7 @@ from ffr_prep.mesh.geometry.skin import region_faces, with_regions
 from ffr_prep.mesh.mesh import Mesh, check_mesh, mesh_hash
 from ffr_prep.model.coupled import CoupledModel, InterfaceRegion
 from ffr_prep.model.invariants import inertia_integrals
+from ffr_prep.model.material import material_doubts
 from ffr_prep.model.model import Model
 from ffr_prep.model.region_rotations import region_stiffening
 from ffr_prep.model.ties import check_names
@@ -82,7 +83,7 @@ def from_mesh(
             },
             "material": described(material),
             "interfaces": [_described(plain, interface) for interface in interfaces],
-            "warnings": mesh_warnings(mesh),
+            "warnings": [*mesh_warnings(mesh), *doubts_of_materials(material)],
         },
         mesh_energy=lambda basis: added_energy(mesh, material, [i.region or i.name for i in interfaces], field(basis)),
         cut=lambda cuts: [from_mesh(*part) for part in cut_mesh(mesh, material, interfaces, cuts)],
@@ -120,6 +121,12 @@ def mesh_warnings(mesh: Mesh) -> list[str]:
         f"{counts['tet4']} first-order tetrahedra (tet4): they are far too stiff in bending (locking); "
         "use second-order elements (tet10)"
     ]
+
+
+def doubts_of_materials(material: Materials) -> list[str]:
+    """What is doubtful about the materials of a mesh, in words."""
+    given = material.values() if isinstance(material, Mapping) else [material]
+    return [doubt for one in given for doubt in material_doubts(one)]
 
 
 def element_counts(mesh: Mesh) -> dict[str, int]:

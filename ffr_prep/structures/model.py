@@ -25,6 +25,7 @@ from ffr_prep.common.arrays import Array
 from ffr_prep.common.progress import Stages, no_stages
 from ffr_prep.model.coupled import CoupledModel, InterfaceRegion
 from ffr_prep.model.invariants import InertiaIntegrals, inertia_integrals
+from ffr_prep.model.material import material_doubts
 from ffr_prep.model.model import Model, merged, summed
 from ffr_prep.model.region_rotations import region_stiffening
 from ffr_prep.model.second_order import SecondOrder
@@ -180,6 +181,9 @@ def _record(
         "members": [_strict(described(member)) for member in frame.members],
         "shells": [described(shell) for shell in frame.shells],
         "interfaces": [described(interface) for interface in interfaces],
+        "warnings": list(
+            dict.fromkeys(d for of in (*frame.members, *frame.shells) for d in material_doubts(of.material))
+        ),
     }
 
 

@@ -1,0 +1,64 @@
+"""Bodies whose numbers do not fit each other, as where lengths, masses or inertia are off by a factor of a thousand."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from ffr_prep.body.reduced import FlexibleBody
+
+_LONG = 100.0  # m
+_HEAVIEST = 2.3e4  # kg/m^3, of osmium
+_FILLED = 0.2  # largest share of the cube over its diagonal that a solid fills: a cube 1 / sqrt(27)
+_LIGHTEST = (
+    1e-6  # kg/m^3 over the cube of the diagonal: a rod of foam that is a thousand times as long as thick has 1e-5
+)
+_FAR = 20.0  # diagonals of the body between it and a point that is attached to it
+_SPREAD = 100.0  # of the farthest point of a body without a shape, which its radius of gyration is not beyond
+
+
+def units_doubts(body: FlexibleBody) -> list[str]:
+    """What cannot be meant of a body, in words: its size, its mass for its size, points far away from it, its inertia.
+
+    >>> fp.units_doubts(body)
+    """
+    return [*_of_shape(body), *_of_points(body)]
+
+
+def _of_shape(body: FlexibleBody) -> Iterator[str]:
+    if body.surface is None or not len(body.surface.points):
+        return
+    low, high = body.surface.points.min(axis=0), body.surface.points.max(axis=0)
+    size = float(np.linalg.norm(high - low))
+    if size > _LONG:
+        yield f"it is {size:.3g} m long: are its lengths millimetres?"
+    if size > 0 and body.mass > _HEAVIEST * _FILLED * size**3:
+        yield (
+            f"it has a mass of {body.mass:.3g} kg and is {size:.3g} m long, heavier than any solid: are its lengths metres, "
+            "or its masses in tonnes or grams?"
+        )
+    if size > 0 and body.mass < _LIGHTEST * size**3:
+        yield f"it has a mass of {body.mass:.3g} kg and is {size:.3g} m long, lighter than any solid: is its mass in tonnes?"
+    for interface in body.interfaces:
+        away = float(np.linalg.norm(np.maximum(0, np.maximum(low - interface.position, interface.position - high))))
+        if size > 0 and away > _FAR * size:
+            yield (
+                f"its point {interface.name!r} is {away:.3g} m away from the body, which is {size:.3g} m long: is the place "
+                "in millimetres? It is in metres"
+            )
+
+
+def _of_points(body: FlexibleBody) -> Iterator[str]:
+    """Of a body without a shape: its inertia against the places of its points."""
+    if body.surface is not None or not body.interfaces:
+        return
+    centre = body.r_dm / body.mass
+    reach = max(float(np.linalg.norm(interface.position - centre)) for interface in body.interfaces)
+    second = float(np.trace(body.rr_dm)) / body.mass - float(centre @ centre)
+    gyration = float(np.sqrt(max(second, 0.0)))
+    if reach > 0 and gyration > _SPREAD * reach:
+        yield (
+            f"its radius of gyration is {gyration:.3g} m and its farthest point {reach:.3g} m from its centre: is the "
+            "inertia in kg mm^2? It is in kg m^2"
+        )

@@ -1,0 +1,80 @@
+"""Numbers that are off by a factor of a thousand are noticed, from commands and from Python, and sound ones are not."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+import pytest
+from boxes import STEEL, box_mesh
+from places import REFERENCE
+
+import ffr_dyn as fd
+import ffr_prep as fp
+from ffr_prep.common.errors import InputError
+from ffr_prep.model.material import Material, material_doubts
+
+PLATE = REFERENCE / "plate.step"
+
+
+def body(material=STEEL, size=(0.3, 0.02, 0.02)):
+    model = fp.from_mesh(box_mesh("hex8", size, (6, 1, 1)), material, [fp.InterfaceRegion("left")])
+    return fp.reduce(model, fp.Request(name="bar", reference=fp.FixedTo("left"), reduction=fp.Eigenmodes(1)))
+
+
+@pytest.mark.parametrize(
+    ("E", "rho"),
+    [(2.1e11, 7850.0), (7e10, 2700.0), (1.05e12, 3500.0), (1.6e10, 11340.0), (1e6, 1100.0), (1e4, 1000.0), (6e6, 12.0)],
+    ids=["steel", "aluminium", "diamond", "lead", "rubber", "gel", "foam"],
+)
+def test_materials_that_there_are_raise_no_doubt(E, rho):
+    assert material_doubts(Material("m", E, 0.3, rho)) == []
+
+
+@pytest.mark.parametrize(
+    ("E", "rho", "doubt"),
+    [
+        (2.1e11, 7.85, r"in g/cm\^3"),
+        (2.1e5, 7850.0, r"sqrt\(E/rho\) is 5.2 m/s"),
+        (210.0, 7850.0, r"sqrt\(E/rho\)"),
+        (2.1e14, 7850.0, r"sqrt\(E/rho\)"),
+        (2.1e11, 7.85e6, "more than that of any solid"),
+    ],
+)
+def test_a_material_in_other_units_is_a_warning_of_its_body(E, rho, doubt):
+    assert re.search(doubt, " ".join(body(Material("m", E, 0.3, rho)).provenance["warnings"]))
+
+
+def test_a_sound_body_raises_no_doubt():
+    assert fp.units_doubts(body()) == []
+    assert fp.units_doubts(fp.rigid_part(PLATE, 2700.0, [fp.InterfaceRegion("pin", "nearest 45,25,5")])) == []
+    thin = fp.rigid_body("pin", mass=0.1, inertia=(1e-5, 1e-5, 1e-5), points={"a": (0, 0, 0), "b": (0.01, 0, 0)})
+    assert fp.units_doubts(thin) == []
+
+
+def test_a_body_of_millimetres_read_in_metres_is_told():
+    assert "are its lengths millimetres" in fp.units_doubts(body(size=(300.0, 20.0, 20.0)))[0]
+
+
+@pytest.mark.parametrize(("factor", "doubt"), [(1e6, "heavier than any solid"), (1e-9, "lighter than any solid")])
+def test_a_mass_that_its_size_cannot_have_is_told(factor, doubt):
+    sound = fp.rigid_part(PLATE, 2700.0)
+    off = replace(sound, mass=factor * sound.mass, r_dm=factor * sound.r_dm, rr_dm=factor * sound.rr_dm)
+    assert doubt in fp.units_doubts(off)[0]
+
+
+def test_a_rigid_part_tells_of_its_density_and_of_points_in_millimetres():
+    far = fp.rigid_part(PLATE, 7.85, [fp.InterfaceRegion("pin", point=(45.0, 25.0, 5.0))])
+    assert ["in g/cm^3" in far.provenance["notes"][0], "'pin' is" in far.provenance["notes"][1]] == [True, True]
+    with pytest.raises(InputError, match="less than any solid's, as in tonnes and millimetres"):
+        fp.rigid_part(PLATE, 7.85e-9)
+
+
+def test_a_scene_tells_of_inertia_in_kg_mm2_and_of_gravity_in_mm_s2():
+    arm = fd.rigid_body("arm", mass=1.0, inertia=(3300.0, 3300.0, 3300.0), points={"a": (0, 0, 0), "b": (0.2, 0, 0)})
+    hinge = fd.Joint("hinge", "revolute", "ground.O", "arm.a")
+    scene = fd.Scene([fd.Body("arm", arm)], [hinge], ground={"O": (0, 0, 0)}, gravity=(0, -9810.0, 0))
+    notes = " ".join(fd.mobility(scene).doubts)
+    assert "is the inertia in kg mm^2" in notes
+    assert "gravity is 9810 m/s^2: is it in mm/s^2?" in notes
+    assert "inertia in kg mm^2" in " ".join(fd.forward(scene, end=0.01, output_step=0.01).attributes["notes"])
