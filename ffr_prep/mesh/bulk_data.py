@@ -93,7 +93,7 @@ def cards(path: Path, above: tuple[Path, ...] = ()) -> Iterator[Card]:
             card = _with_early(Card(name.rstrip("*_").upper(), fields, number, mark), early)
             continue
         own = _mark(name)
-        if own and card and card.mark not in ("", own) and own not in waiting:
+        if own and own not in waiting and (card is None or card.mark not in ("", own)):
             early[own] = Card(name, fields, number, mark)
             continue
         if own in waiting and not (card and card.mark == own):

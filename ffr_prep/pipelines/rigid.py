@@ -54,6 +54,8 @@ def rigid_part(
     >>> crank = fp.rigid_part("crank.step", 7850.0, [fp.InterfaceRegion("pin", "cylinder r=6mm at 0,0,0")])
     """
     path, numbers = Path(path), dict(numbers or {})
+    if not 0 < density < np.inf:
+        raise InputError(f"the density is {density} kg/m^3; it must be positive")
     Material("of the part", 1.0, 0.0, density)  # refuses what no solid has
     check_request(path, unit, None, numbers, 1)
     faces, solid = _geometry(path, unit, numbers, solids)

@@ -30,6 +30,7 @@ from ffr_prep.mesh.mesh import Mesh, boundary_faces, facet_triangles, region_nod
 
 _SHARP = np.cos(np.radians(35.0))  # of normals across an edge: twelve elements to the turn are not sharp
 _FLAT = 1e-6  # of 1 - cos, between facets of a plane
+_ALIKE = np.cos(np.radians(10.0))  # of normals with their mean
 _LARGE = 0.2  # of the area of a piece that a plane in it has
 _ON = 2e-4  # how far nodes may lie off their surface, of its size
 _DEEPEST = 20
@@ -198,12 +199,20 @@ def _split(skin: _Skin, piece: Array, smooth: Array, flat: Array, depth: int) ->
     planes = _components(piece, flat)
     areas = [np.linalg.norm(skin.normals[of], axis=1).sum() for of in planes]
     largest = planes[int(np.argmax(areas))]
-    if max(areas) < _LARGE * sum(areas) or largest.size == piece.size:
+    alone = largest.size == 1 and skin.corners[largest[0], 2] == skin.corners[largest[0], 3]  # a triangle, always flat
+    if max(areas) < _LARGE * sum(areas) or largest.size == piece.size or alone or _nearly_flat(skin, piece):
         yield piece
         return
     yield largest
     for rest in _components(np.setdiff1d(piece, largest), smooth):
         yield from _split(skin, rest, smooth, flat, depth + 1)
+
+
+def _nearly_flat(skin: _Skin, piece: Array) -> bool:
+    """Whether the normals of a piece are all alike, as of a curved strip that is one element wide: no plane is in it."""
+    unit = skin.normals[piece] / np.maximum(np.linalg.norm(skin.normals[piece], axis=1), np.finfo(float).tiny)[:, None]
+    mean = skin.normals[piece].sum(axis=0)
+    return bool((unit @ mean).min() > _ALIKE * np.linalg.norm(mean))
 
 
 def _components(chosen: Array, bonds: Array) -> list[Array]:

@@ -211,10 +211,22 @@ def test_fields_beyond_a_line_and_repeated_cards_are_refused(tmp_path):
             fp.read_mesh(tmp_path / "a.bdf")
 
 
-def test_a_continuation_of_nothing_is_refused(tmp_path):
-    (tmp_path / "a.bdf").write_text("+A1     1       2\n")
-    with pytest.raises(InputError, match="line 1 goes on with a card, but there is none"):
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [("+A1     1       2\n", "ends with the mark .*A1, but none does"), (",1,2\n", "but there is none above it")],
+)
+def test_a_continuation_of_nothing_is_refused(tmp_path, line, said):
+    (tmp_path / "a.bdf").write_text(line)
+    with pytest.raises(InputError, match=f"line 1 goes on with a card.*{said}"):
         list(cards(tmp_path / "a.bdf"))
+
+
+def test_a_continuation_may_stand_before_all_cards(tmp_path):
+    (tmp_path / "a.bdf").write_text(
+        "+A1     8       9\nCHEXA   1       1       2       3       4       5       6       7       +A1\n"
+    )
+    (card,) = cards(tmp_path / "a.bdf")
+    assert card.fields[:10] == ["1", "1", *"23456789"]
 
 
 # ---- CalculiX -----------------------------------------------------------------------------------------------------

@@ -14,7 +14,9 @@ from places import MESHES, REFERENCE
 
 import ffr_prep as fp
 from ffr_prep.common.errors import InputError
+from ffr_prep.mesh.geometry.face import Face
 from ffr_prep.mesh.geometry.faces import feature_centre
+from ffr_prep.mesh.geometry.fits import recognised
 from ffr_prep.mesh.geometry.region_words import Names, Query, is_query, parsed
 from ffr_prep.mesh.geometry.regions import found, query_for
 from ffr_prep.mesh.geometry.skin import mesh_faces, with_regions
@@ -461,6 +463,31 @@ def test_a_fillet_is_no_bore(tmp_path):
         with pytest.raises(InputError, match="finds 2 cylinders"):
             found(faces, "cylinder r=6mm")
         assert any("concave cylinder r 6 over 90°" in line for line in face_lines(faces))
+
+
+@pytest.mark.parametrize("turned", [0.0, 0.3])
+@pytest.mark.parametrize(("around", "height"), [(5, 3.0), (6, 3.0), (6, 20.0), (12, 1.0)])
+def test_a_coarse_bore_is_one(around, height, turned):
+    """Its triangles lean far towards the axis where it is short, and their normals add up to nothing."""
+    angles = 2 * np.pi * np.arange(around) / around
+    low = np.stack([np.cos(angles), np.sin(angles), 0 * angles], axis=1)
+    top = np.stack([np.cos(angles + turned), np.sin(angles + turned), 0 * angles + height / 6], axis=1)
+    k, following = np.arange(around), np.roll(np.arange(around), -1)
+    sides = np.concatenate(
+        [np.stack([k, k + around, following], 1), np.stack([following, k + around, following + around], 1)]
+    )
+    points = 6e-3 * np.concatenate([low, top])
+    face = recognised(Face("f", "other", np.zeros(3), 1.0), points, sides, 2e-4)
+    assert (face.kind, face.hollow) == ("cylinder", True)
+    assert face.radius == pytest.approx(6e-3)
+    np.testing.assert_allclose(np.abs(face.axis), [0, 0, 1], atol=1e-6)
+
+
+def test_few_nodes_make_no_cylinder_and_no_sphere_of_a_patch():
+    """Five numbers make a cylinder, so five nodes lie on some cylinder whatever they are."""
+    points = np.array([[0, 0, 0], [1, 0, 0.1], [1, 1, 0], [0, 1, 0.13], [2, 0.4, 0.5]])
+    triangles = np.array([[0, 1, 2], [0, 2, 3], [1, 4, 2]])
+    assert recognised(Face("f", "other", np.zeros(3), 1.0), points, triangles, 2e-4).kind == "other"
 
 
 # ---- models without faces -------------------------------------------------------------------------------------------
