@@ -34,6 +34,7 @@ from ffr_prep.common.errors import InputError
 from ffr_prep.interchange.common_format import Content, bounds, nodes, read_body, real, usable, write_lines
 from ffr_prep.interchange.sid_blocks import (
     Section,
+    Taylor,
     in_standard_order,
     integer,
     only,
@@ -60,6 +61,7 @@ from ffr_prep.interchange.stated_frequencies import other_frequencies
 from ffr_prep.model.invariants import from_inertia, skew
 
 BLOCKS = ("mdCM", "J", "Ct", "Cr", "Me", "Gr", "Ge", "Oe", "ksigma", "Ke", "De")
+_OPTIONAL = {"ksigma": "prestress", "De": "damping"}
 NAMES = "interfaces="
 
 
@@ -198,15 +200,16 @@ def read_sid(path: str | Path) -> FlexibleBody:
 
 
 def _content(lines: list[str], path: Path) -> Content:
-    count, n, names = _first_line(lines)
-    modal = part(part(sections(lines, 1), "part"), "modal")
+    first = next((k for k, line in enumerate(lines) if line.strip()), 0)
+    count, n, names = _first_line(lines[first:])
+    modal = part(part(sections(lines, first + 1), "part"), "modal")
     only(modal, ("refmod", "frame", *BLOCKS))
     notes = ["every node became an interface of the kind 'node'", "the format has no surface to draw"]
     if not in_standard_order(modal, n):
         notes.append("the indices of m1 are in the order (row, column, mode)")
     refmod = part(modal, "refmod")
     mass = _mass(refmod, n)
-    found = {name: taylor(part(modal, name), *size, n) for name, size in _sizes(n).items()}
+    found = {name: _taylor(modal, name, size, n, notes) for name, size in _sizes(n).items()}
     at = read_nodes(part(modal, "frame"), count, n, names)
     M, K = found["Me"].m0, found["Ke"].m0
     limit = bounds(mass, from_inertia(tensor(found["J"].m0[:, 0])), M)
@@ -242,6 +245,14 @@ def _content(lines: list[str], path: Path) -> Content:
     )
     stiffening = np.concatenate([stiffness, np.zeros((6, n, n)), at.stiffening])
     return with_second_moments(content, stiffening, found, limit, moments.axes)
+
+
+def _taylor(modal: Section, name: str, size: tuple[int, int], n: int, notes: list[str]) -> Taylor:
+    """A block; of zeros, with a note, where a file leaves out one of those that are so in most."""
+    if name in _OPTIONAL and not any(block.word == name.lower() for block in modal.parts):
+        notes.append(f"the file has no block {name}, which says {_OPTIONAL[name]}: none is taken")
+        return Taylor(np.zeros(size), np.zeros((size[0], n, size[1])))
+    return taylor(part(modal, name), *size, n)
 
 
 def _sizes(n: int) -> dict[str, tuple[int, int]]:

@@ -612,11 +612,11 @@ def test_damaged_files_are_refused(tmp_path, lines, old, new, said):
 
 
 def test_blocks_must_be_there_once(tmp_path, lines):
-    span = within(lines, "De")
-    with pytest.raises(InputError, match="must hold one block 'De'; lines: none"):
+    span = within(lines, "Ke")
+    with pytest.raises(InputError, match="must hold one block 'Ke'; lines: none"):
         read_sid(with_lines(tmp_path, lines[: span[0]] + lines[span[-1] + 1 :]))
     twice = lines[: span[-1] + 1] + lines[span[0] :]
-    with pytest.raises(InputError, match=r"must hold one block 'De'; lines: \d+, \d+"):
+    with pytest.raises(InputError, match=r"must hold one block 'Ke'; lines: \d+, \d+"):
         read_sid(with_lines(tmp_path, twice))
 
 

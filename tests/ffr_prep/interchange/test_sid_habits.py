@@ -49,6 +49,18 @@ def test_what_a_habit_leaves_out_is_said(tmp_path, lines):
         assert said[habit]["warnings"] == []
 
 
+@pytest.mark.parametrize(("name", "says"), [("De", "damping"), ("ksigma", "prestress")])
+def test_blocks_of_zeros_may_be_left_out_and_lines_be_blank_before_the_first(tmp_path, lines, name, says):
+    start, end = (
+        next(k for k, x in enumerate(lines) if x.split() == [name]),
+        next(k for k, x in enumerate(lines) if x.split() == ["end", name]),
+    )
+    body = read(tmp_path, ["", "  ", *lines[:start], *lines[end + 1 :]])
+    for key in INTEGRALS:
+        np.testing.assert_allclose(getattr(body, key), getattr(cloud(3), key), atol=1e-10, err_msg=key)
+    assert f"the file has no block {name}, which says {says}: none is taken" in body.provenance["notes"]
+
+
 def test_a_mode_of_rotary_inertia_is_read(tmp_path, lines):
     body = read(tmp_path, sid_habits.rotary_inertia(lines))
     assert "-2 Me fails by 2.0e+00" in body.provenance["warnings"][-1]
