@@ -49,6 +49,7 @@ QUICK = 1e7  # microseconds of the further runs, by `_cost`, up to which they ar
 Beginning = Literal["as-given", "quasi-static", "steady", "periodic"]  # the default and the others
 
 # What a step is to keep within the accuracy always, and what where it does not ring.
+_LOADS = re.compile(r"\.(force|moment|torque|tension|effort)$")
 PLACES = re.compile(r"\.(position|R|p|angle|stroke|orientation)$")
 DRIVING = re.compile(r"\.(displacement|rotation|force|moment|effort|torque|tension)$|^measured\.")
 
@@ -360,9 +361,12 @@ def _finished(runs: _Runs, trial: _Trial, path: str | Path | None, ringing: Set[
 
 def _worst(errors: Mapping[str, StepError]) -> str:
     name = max(errors, key=lambda one: errors[one].of_range)
-    places = max((e.of_range for one, e in errors.items() if PLACES.search(one)), default=None)
-    rest = "" if places is None or PLACES.search(name) else f"; positions and angles within {_percent(places)}"
-    return f"step: within {_of_the_range(errors[name].of_range)} of {name}{rest}"
+    said = [f"step: within {_of_the_range(errors[name].of_range)} of {name}"]
+    for words, kind in (("positions and angles", PLACES), ("forces and moments", _LOADS)):
+        of_kind = [error.of_range for one, error in errors.items() if kind.search(one)]
+        if of_kind and not kind.search(name):
+            said.append(f"{words} within {_percent(max(of_kind))}")
+    return "; ".join(said)
 
 
 def _at_least(errors: Mapping[str, StepError]) -> str:

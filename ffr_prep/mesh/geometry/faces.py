@@ -128,7 +128,7 @@ def feature_in_words(of: Faces, feature: Sequence[int]) -> str:
     scale, first = METRES[of.unit], of.faces[feature[0]]
     names = f"; {'+'.join(of.faces[k].name for k in feature)}" if len(feature) > 1 else ""
     at = numbers(tidy(centre / scale, of.size / scale))
-    solids = f" of {', '.join(solids_of(of, feature))}" if several_solids(of) and not first.inner else ""
+    solids = f", of {', '.join(solids_of(of, feature))}" if several_solids(of) and not first.inner else ""
     return f"{surface_in_words(of, feature[0])}{solids}, centre {at} {of.unit}, area {area / scale**2:.5g} {of.unit}²{names}"
 
 
