@@ -159,6 +159,7 @@ if TYPE_CHECKING:  # the same names, for editors and checkers of types
         hot_spots as hot_spots, peaks as peaks, section_forces as section_forces, section_histories as
         section_histories, section_peaks as section_peaks, stress_histories as stress_histories
     )
+    from ffr_dyn.results.stress_error import stress_error as stress_error
     from ffr_dyn.consistency.assemble import Assembled as Assembled, assemble as assemble
     from ffr_dyn.consistency.mobility import Mobility as Mobility, mobility as mobility
     from ffr_dyn.consistency.validity import in_enough_parts as in_enough_parts, parts_needed as parts_needed

@@ -89,10 +89,7 @@ def animate(
     plots, arrows = tuple(plots), tuple(arrows)
     make = partial(_page, result, title, view, playing, plots, arrows, how)
     if target and write:
-        if plots:
-            raise InputError(
-                f"{target}: histories are plotted beside the motion on a page; write .html, or leave out {plots[0]!r}"
-            )
+        _check_alone(target, plots)
         shown = with_arrows(film(result, frames, **how), connections(result), result.time, arrows)
         with replacing(target) as part:
             write(_Show(shown, playing / frames, view or camera_for(shown), size), part)
@@ -152,6 +149,14 @@ def _check_settings(fps: int, duration: float | None, size: tuple[int, int]) -> 
         raise InputError(f"duration is {duration} s; it must be positive and at most 3600 s")
     if min(size) < 64 or max(size) > 4096:
         raise InputError(f"size is {size}; width and height must lie between 64 and 4096 pixels")
+
+
+def _check_alone(path: Path, plots: tuple[str, ...]) -> None:
+    """InputError for histories beside pictures, which have no room for them."""
+    if plots:
+        raise InputError(
+            f"{path}: histories are plotted beside the motion on a page; write .html, or leave out {plots[0]!r}"
+        )
 
 
 def _pace(result: Result, fps: int, duration: float | None) -> tuple[float, int]:

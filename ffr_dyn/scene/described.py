@@ -31,7 +31,7 @@ def described(scene: Scene) -> dict[str, Any]:
     ground = {name: at.tolist() for name, at in scene.ground.items()}
     sizes = {"mass": sum(body.model.mass for body in scene.bodies), "length": _length(scene)}
     stress = {body.name: of for body in scene.bodies if (of := left_out_stress(body.model.provenance))}
-    found = {**sizes, "parts": parts, "ground": ground, "connections": _connections(scene)}
+    found: dict[str, Any] = {**sizes, "parts": parts, "ground": ground, "connections": _connections(scene)}
     if stress:
         found |= {"gravity": [float(g) for g in scene.gravity], "left_out_stress": stress}
     return {"title": scene.name} | {key: value for key, value in found.items() if value}

@@ -171,6 +171,7 @@ def _inertia(part: Family, nodal: Array, own: slice) -> InertiaIntegrals:
 def _record(
     frame: Frame, interfaces: Sequence[InterfaceRegion], coupled: CoupledModel, parts: Sequence[Family]
 ) -> dict[str, Any]:
+    materials = [*(member.material for member in frame.members), *(shell.material for shell in frame.shells)]
     return {
         "frame": {
             "hash": frame_hash(frame),
@@ -181,9 +182,7 @@ def _record(
         "members": [_strict(described(member)) for member in frame.members],
         "shells": [described(shell) for shell in frame.shells],
         "interfaces": [described(interface) for interface in interfaces],
-        "warnings": list(
-            dict.fromkeys(d for of in (*frame.members, *frame.shells) for d in material_doubts(of.material))
-        ),
+        "warnings": list(dict.fromkeys(doubt for material in materials for doubt in material_doubts(material))),
     }
 
 
