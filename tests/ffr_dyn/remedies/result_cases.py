@@ -236,6 +236,8 @@ PICTURES = [
     Case(p(animated, "film.gif", duration=-1.0), p(animated, "film.gif")),
     Case(p(animated, "film.gif", size=(8, 8)), p(animated, "film.gif")),
     Case(bare, p(animated, "film.gif")),
+    Case(p(animated, "film.gif", plots=(POSITION,)), p(animated, "film.html", plots=(POSITION,))),
+    Case(p(animated, "film.gif", arrows=("nothing",)), p(animated, "film.gif", arrows=())),
     Case(blind, p(animated, "film.html")),
     Case(p(shown, emptied), p(shown, result)),
     Case(p(shown, result, scale=-1.0), p(shown, result, scale=1.0)),

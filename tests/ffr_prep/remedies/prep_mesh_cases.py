@@ -107,7 +107,7 @@ DECKS = [
     rewritten(
         read_mesh,
         "fields.bdf",
-        (("BEGIN BULK\n", "BEGIN BULK\n+A1     7\n"),),
+        (("BEGIN BULK\n", "BEGIN BULK\n,7\n"),),
         (),
     ),
     of("fields.bdf", ("GRID,4,", "GRID,x,")),
