@@ -22,7 +22,8 @@ from ffr_dyn.consistency.evaluation import evaluator, joined, record_states
 from ffr_dyn.consistency.tangent import sizes_of
 from ffr_dyn.equations.layout import moved
 from ffr_dyn.integrators import ROS3, Integrator
-from ffr_dyn.linear.turn_map import Returned, Turns, floquet_modes, floquet_shape, period_of, returned, turns
+from ffr_dyn.linear.returning import Returned, returned
+from ffr_dyn.linear.turn_map import Turns, floquet_modes, floquet_shape, period_of, turns
 from ffr_dyn.linear.words import in_words
 from ffr_dyn.results.quantities import selected
 from ffr_dyn.results.result import Result

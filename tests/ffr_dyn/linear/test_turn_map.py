@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -90,6 +92,19 @@ def test_modes_about_the_turn_of_an_engine_are_those_of_its_rod():
     lasting = [name for name in a["leading"] if name != "gone after a period"]
     assert len(lasting) == np.sum(np.abs([complex(*pair) for pair in a["multipliers"]]) > 1e-6) >= 2
     assert all(name.startswith("rod: ") for name in lasting)
+
+
+@pytest.mark.parametrize(("damping", "turns"), [(0.1, 20), (0.01, 60)])
+def test_deflections_come_back_to_a_hundred_millionth_of_themselves(damping, turns):
+    """Of a turn of a long run: also where vibrations last for many turns, and where they are small beside the scene."""
+    scene = flexible_crank(loads=())
+    bodies = tuple(replace(body, damping=damping) if body.model.n else body for body in scene.bodies)
+    scene = replace(scene, bodies=bodies)
+    found = fd.periodic(scene)
+    period = found.attributes["period"]
+    how = {"output_step": period / 100, "method": fd.ROS3(period / 1000), "check": False}
+    run = fd.forward(scene, end=turns * period, stabilisation=fd.Projection(1e-14), **how)
+    np.testing.assert_allclose(run["rod.q"][-101:], found["rod.q"], rtol=0, atol=1e-8 * np.abs(found["rod.q"]).max())
 
 
 def test_a_driven_machine_ends_where_a_long_run_does():
