@@ -33,7 +33,7 @@ from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError, InputError
 
 ROWS = 100  # the steps of a period are as many or a multiple
-CLOSED = 1e-13  # of constraints, relative to the scene: what a projection leaves open is a kick of stiff bodies at every return
+CLOSED = 1e-13  # of constraints, relative to the scene: what is left open kicks stiff bodies at every return
 DIFFERENCE = 1e-5  # rad, or relative to the scene; of derivatives of a period, which are extrapolated
 LATER = 0.37  # s: when a driver is asked again whether it turns evenly
 CORRECTIONS, MET = 12, 1e-13  # of a deviation onto the constraints, and of Phi [m, -]
