@@ -502,11 +502,16 @@ def _not_lasting(found: Steady) -> InputError | None:
     turned = np.abs(about.jacobian @ (found.Z / np.abs(found.Z / size[:, None]).max(axis=0, initial=1e-300))).max(
         axis=1, initial=0.0
     )
-    bad = np.maximum(opened, turned)
-    if bad.max(initial=0.0) <= OPENS * max(1.0, float(size.max())):
+    bad, limit = np.maximum(opened, turned), OPENS * max(1.0, float(size.max()))
+    if bad.max(initial=0.0) <= limit:
         return None
     names = [block.name for block in machine.system.blocks for _ in block.words]
     worst = int(np.argmax(bad[: len(names)])) if names else 0
+    if opened.max(initial=0.0) <= limit:
+        return InputError(
+            f"about the steady motion {names[worst]!r} lets bodies that turn at different speeds move aside together, which "
+            "has no constant axes: put a stiff Bushing in its place, which may turn freely, or take `periodic` with floquet"
+        )
     return InputError(
         f"no steady motion: with every body turning on at a constant speed, {names[worst]!r} does not hold; a machine whose "
         "bodies do not all turn evenly, about axes that stay, has a periodic motion: `periodic`"

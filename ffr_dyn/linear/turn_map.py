@@ -134,7 +134,8 @@ def deviation(of: Turns, x: Array, v: Array) -> Array:
     if np.abs(y / of.sizes).max() > AGAIN:
         raise ComputationError(
             f"after a period of {of.period:.6g} s the scene is not where it began: the period is not that of its drivers and "
-            "loads, or a body goes on turning; give another period"
+            "loads, or a body goes on turning (give another period), or bodies swing up to the speed of what drives them "
+            "(give them its velocity)"
         )
     return np.concatenate([near.W.T @ y, near.W.T @ (V - near.V)])
 
