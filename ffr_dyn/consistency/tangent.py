@@ -48,9 +48,10 @@ class Chart:
 
 
 def chart(at: Evaluator, time: float, x: Array, v: Array) -> Chart:
-    """The chart around a state (x, v) that meets the constraints."""
+    """The chart around a state (x, v) that meets the constraints. From there angles count their turns."""
     scene, place = at.system.scene, at.system.layout
     now = evaluate(at, time, x, v)
+    at.work.loads.reference[:] = at.work.loads.measured
     M = total_mass_matrix(scene, place, x)
     Z = free_motions(now.jacobian, M)
     movement = np.abs(Z / sizes(at)[:, None]).max(axis=0, initial=0.0)

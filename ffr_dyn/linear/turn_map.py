@@ -17,7 +17,7 @@ import numpy as np
 from ffr_dyn.compile.engine import fill_rows, new_engine
 from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.compile.workspace import new_record
-from ffr_dyn.consistency.evaluation import evaluate, evaluator
+from ffr_dyn.consistency.evaluation import Evaluator, evaluate, evaluator
 from ffr_dyn.consistency.failure import failure
 from ffr_dyn.consistency.tangent import STEP, Chart, chart, length_of, sizes_of
 from ffr_dyn.equations.layout import Layout, moved, to_body_axes, to_global_axes
@@ -70,11 +70,19 @@ def turns(system: System, time: float, x: Array, v: Array, method: Integrator, p
     """The map over a period; the state (x, v) meets the constraints."""
     steps = max(1, round(period / method.step))
     steps = steps if steps < ROWS else -(-steps // ROWS) * ROWS
-    near = chart(evaluator(system), time, x, v)
-    jacobian = evaluate(near.at, time, x, v).jacobian
     shortened: Any = method
-    across, sizes = np.linalg.solve(near.M, jacobian.T), sizes_of(system)
-    return Turns(near, across, sizes, replace(shortened, step=period / steps), period, steps)
+    return _about(evaluator(system), time, x, v, replace(shortened, step=period / steps), period, steps)
+
+
+def turns_about(of: Turns, x: Array, v: Array) -> Turns:
+    """The same map about another state near the chart's."""
+    return _about(of.near.at, of.near.time, x, v, of.method, of.period, of.steps)
+
+
+def _about(at: Evaluator, time: float, x: Array, v: Array, method: Integrator, period: float, steps: int) -> Turns:
+    near = chart(at, time, x, v)
+    jacobian = evaluate(near.at, time, x, v).jacobian
+    return Turns(near, np.linalg.solve(near.M, jacobian.T), sizes_of(at.system), method, period, steps)
 
 
 def period_of(scene: Scene, time: float) -> float:
@@ -97,6 +105,7 @@ def after(of: Turns, x: Array, v: Array, *, rows: int = 1, later: float = 0.0) -
     start = of.near.time + later
     closed = gains(Projection(CLOSED * length_of(of.system)))
     engine = new_engine(of.system, x, v, of.method, closed, start=start, spacing=of.method.step)
+    engine.work.loads.reference[:] = of.near.at.work.loads.reference
     record = new_record(of.system, rows)
     status = fill_rows(engine, record, start, of.steps // rows)
     if status != OK:

@@ -172,3 +172,29 @@ def test_the_mode_that_grows_by_a_parametric_resonance_is_told():
     assert [rate for _, rate in exponents] == pytest.approx([w / 2, w / 2])
     assert exponents[0][0] > 0.1
     assert len(lines) == 2
+
+
+@pytest.mark.parametrize("turned", [0.0, np.pi, -np.pi])
+def test_a_spring_is_the_same_whichever_way_its_joint_is_drawn(turned):
+    """Also where deviations from the periodic motion go around half a turn, from where angles are measured anew."""
+    crank = fd.rigid_body("crank", mass=1.0, inertia=(0.1, 0.1, 0.1), points={"o": (0, 0, 0), "h": (0.2, 0, 0)})
+    spin, k = (0, 0, 20.0), 50.0
+    bodies = (
+        fd.Body("crank", crank, omega_bar=spin),
+        fd.Body(
+            "arm", bar("arm", 1.0), position=(0.2, 0, 0), rotation=(0, 0, turned), velocity=(0, 4.0, 0), omega_bar=spin
+        ),
+    )
+    joints = (fd.Joint("axis", "revolute", "ground.O", "crank.o"), fd.Joint("lag", "revolute", "crank.h", "arm.a"))
+    scene = fd.Scene(
+        bodies, joints, (fd.Driver("motor", "axis", fd.polynomial(0.0, 20.0)),), ground={"O": (0, 0, 0)},
+        forces=(fd.JointSpring("spring", "lag", stiffness=k, damping=0.5, free=turned),),
+    )  # fmt: skip
+    found = fd.periodic(scene, floquet=True)
+    mass = bar("arm", 1.0).mass
+    inward = np.cos(turned) * 0.2 * mass * 0.5 * 20.0**2
+    exact = np.roots([mass / 3, 0.5, k + inward])
+    values = np.array([complex(*one) for one in found.attributes["multipliers"]])
+    np.testing.assert_allclose(np.sort(np.abs(values)), np.abs(np.exp(exact * found.attributes["period"])), rtol=1e-6)
+    state = fd.linearise(scene)
+    np.testing.assert_allclose(np.sort(state.eigenvalues.real), exact.real, rtol=1e-6)
