@@ -47,7 +47,7 @@ def draw_campbell(result: Result, path: str | Path) -> Path:
         _name_lines(upper, a["names"], shown[-1])
         _draw_orders(upper, a["orders"], float(speed[-1]), top)
         for one in a["critical"]:
-            _mark(upper, one["speed"], one["order"] * one["speed"] / (2 * np.pi))
+            _mark(upper, one["speed"], one["order"] * one["speed"] / (2 * np.pi), one["mode"].endswith("backward"))
         for one in a["limits"]:
             for axes in (upper, lower):
                 axes.axvline(one["speed"], color=RED, linewidth=1.0)
@@ -67,9 +67,11 @@ def _from_rpm(speed: Array) -> Array:
     return speed * np.pi / 30
 
 
-def _mark(axes: Axes, speed: float, frequency: float) -> None:
+def _mark(axes: Axes, speed: float, frequency: float, backward: bool) -> None:
+    """With its number, of backward whirls on the other side of the line than of forward ones, which may be near."""
     axes.plot(speed, frequency, "o", color="#000000", markersize=5)
-    axes.annotate(f"{speed:.4g}", (speed, frequency), (5, -10), textcoords="offset points", fontsize=SMALL - 1)
+    at, side = ((-5, 5), "right") if backward else ((5, -11), "left")
+    axes.annotate(f"{speed:.4g}", (speed, frequency), at, textcoords="offset points", ha=side, fontsize=SMALL - 1)
 
 
 def _draw_orders(axes: Axes, orders: Sequence[float], last: float, top: float) -> None:
