@@ -25,6 +25,7 @@ from ffr_prep.common.errors import ComputationError
 PERIODS, KEPT = 60, 12  # of the mixing: at most, and how many are mixed
 STALLED = 0.7  # of a step over that of KEPT periods before, from where mixing gives way to Newton's method
 COARSER, FEWEST = 10, 100  # times the steps of cheap periods, and how many of these a period has at least
+AMPLIFIED = 30.0  # of a step over what is open, of cheap maps: beyond it differences are rounding or far from linear
 # What counts as brought back, by the step to the fixed point: [rad], or relative to the scene; rates times the period.
 ROUGH, RETURNS = 1e-6, 1e-10  # of coarse steps, of the right ones
 DEFLECTS = 5e-9  # of elastic coordinates, and of their rates, relative to the largest of the body over the period
@@ -79,7 +80,9 @@ class _Known:
         along = np.zeros(closing.size)
         if len(points) > 1:
             steps, changes = np.diff(points, axis=0), np.diff(closings, axis=0)
-            shares = np.linalg.lstsq(changes.T, closing, rcond=1e-12)[0]
+            sizes = np.maximum(np.linalg.norm(changes, axis=1), 1e-300)[:, None]
+            steps, changes = steps / sizes, changes / sizes
+            shares = np.linalg.lstsq(changes.T, closing, rcond=1e-8)[0]
             along, closing = shares @ steps, closing - shares @ changes
         rest = self.below.step(closing) if self.below else closing
         found: Array = rest - along
@@ -94,6 +97,16 @@ class _Known:
 def returned(of: Turns) -> Returned:
     """The periodic state near the chart's. Raises ComputationError where there is none."""
     s, below = _by_cheap_maps(of)
+    try:
+        return _searched(of, s, below)
+    except ComputationError:
+        if not s.any():
+            raise
+    return _searched(of, np.zeros(s.size), None)  # which coarse steps may have led away from
+
+
+def _searched(of: Turns, s: Array, below: _Known | None) -> Returned:
+    """From a state near the one that comes back, with what is known of a cheaper map."""
     errors, scale, records = list[float](), of.scale, list[Record]()
 
     def image(s: Array) -> Array:
@@ -108,7 +121,7 @@ def returned(of: Turns) -> Returned:
         if below and len(known.points) == 1:
             below.explore(known.step(closing))
         step = known.step(closing)
-        errors.append(_largest(step))
+        errors.append(max(_largest(step), _largest(closing)))
         if len(errors) > 1 and _is_back(of, step, records[-1], errors):
             break
         if _stalls(errors):
@@ -126,7 +139,7 @@ def _largest(values: Array) -> float:
 
 
 def _is_back(of: Turns, step: Array, record: Record, errors: list[float]) -> bool:
-    """Whether the fixed point is a step away that does not count, or is rounding."""
+    """Whether the fixed point is a step away that does not count, or is rounding; nor may what is left open count."""
     if errors[-1] > RETURNS:
         return False
     near, place, (y, z) = of.near, of.system.layout, (step * of.scale).reshape(2, -1)
@@ -158,7 +171,10 @@ def _by_cheap_maps(of: Turns) -> tuple[Array, _Known | None]:
             s = s + rough.step(rough.add(s))
             errors.append(_largest(s - rough.points[-1]))
         s = rough.points[-1]
-        return s + near.step(near.add(s)), near
+        closing = near.add(s)
+        step = near.step(closing)
+        trusted = _largest(step) <= AMPLIFIED * _largest(closing)
+        return (s + step, near) if trusted else (s, None)
     except ComputationError:
         return np.zeros(s.size), None
 
