@@ -97,7 +97,7 @@ def campbell(
     """Frequencies and damping of a scene over a list of rising speeds [rad/s]: a row for each.
 
     turn   : what has the speed, as of `steady`;  orders : multiples of the speed that excite;  modes : how many, from the
-             slowest at the first speed
+             slowest at the first speed; limits of stability are those of all
     progress : called with how much of how much is done, speeds and then vibrations
 
     The result has `speed` [rad/s], and of each vibration `frequencies` [Hz] in the turning axes and `seen` [Hz] from the
@@ -127,19 +127,26 @@ def campbell(
         raise InputError("nothing vibrates: joints and the driver fix every motion, or what they leave is free")
     middle = spectra[len(spectra) // 2]
     whirling = np.nan_to_num(middle.whirl) > ONE_WAY
-    order = np.argsort(np.where(whirling, np.abs(spectra[0].seen), np.abs(spectra[0].values)), kind="stable")[:modes]
-    names = middle.only(order).names
-    critical, limits = list[dict[str, Any]](), list[dict[str, Any]]()
-    for count, (m, name) in enumerate(zip(order.tolist(), names, strict=True), 1):
-        critical += _criticals(at, values, spectra, m, bool(whirling[m]), orders, name)
-        limits += [{"speed": speed, "mode": name} for speed in _limits(at, values, spectra, m)]
-        progress(len(values) + count, len(values) + len(names))
+    everything, called = _slowest(spectra, whirling), middle.names
+    order, critical = everything[:modes], list[dict[str, Any]]()
+    for count, m in enumerate(order.tolist(), 1):
+        critical += _criticals(at, values, spectra, m, bool(whirling[m]), orders, called[m])
+        progress(len(values) + count, len(values) + order.size)
+    limits = [{"speed": one, "mode": called[m]} for m in everything.tolist() for one in _limits(at, values, spectra, m)]
     kept = [one.only(order) for one in spectra]
     crossed = {"orders": [float(k) for k in orders], "critical": critical, "limits": limits}
-    found = _as_result(scene, time, values, kept, names, whirling[order], crossed)
+    found = _as_result(scene, time, values, kept, [called[m] for m in order.tolist()], whirling[order], crossed)
     if path is not None:
         save_result(found, path)
     return found
+
+
+def _slowest(spectra: Sequence[Spectrum], whirling: Array) -> Array:
+    """Numbers of the vibrations by the moduli of their eigenvalues from the ground; last what only decays at all speeds."""
+    first = spectra[0]
+    modulus = np.hypot(first.values.real, np.where(whirling, first.seen, first.values.imag))
+    decays = np.all([np.abs(one.values.real) >= np.abs(one.values.imag) for one in spectra], axis=0)
+    return np.lexsort((modulus, decays))
 
 
 def _at_speeds(scene: Scene, turn: str, time: float) -> Callable[[float, Spectrum | None], Spectrum]:

@@ -84,6 +84,19 @@ def test_damping_inside_is_unstable_above_a_limit():
     assert "forward grows by" in note
 
 
+def test_what_only_decays_is_no_slow_vibration():
+    """Tilting that is damped away has no frequency but that of the turning: it hides neither critical speeds nor limits."""
+    scene = jeffcott(0.4, 0.2)
+    shaft, air = scene.forces
+    scene = replace(scene, forces=(replace(shaft, damping=np.diag([0.4, 0.4, 0, 900, 900, 900])), air))
+    found = fd.campbell(scene, speeds=(5.0, 26.0, 47.0), modes=2)
+    assert all(name.startswith("disc shift") for name in found.attributes["names"])
+    assert {name.split(", ")[1] for name in found.attributes["names"]} == {"forward", "backward"}
+    for modes in (1, 2):
+        (limit,) = fd.campbell(scene, speeds=(5.0, 26.0, 47.0), modes=modes).attributes["limits"]
+        assert limit["speed"] == pytest.approx(30.0, rel=1e-8)
+
+
 def test_modes_have_names_and_free_spins_are_no_vibrations():
     speed = 100.0
     scene = fd.Scene(
