@@ -87,7 +87,8 @@ def _forms(scene: Scene, place: Layout, screws: Screws, x: Array, shapes: Array)
     m = shapes.shape[1]
     i, j, k = (one.ravel() for one in np.meshgrid(range(m), range(m), range(4), indexing="ij"))
     sums = (shapes[:, i] + 1j**k * shapes[:, j])[None]
-    sizes = sum(_integrals(body, place, screws, x, b, sums)[:, 0] for b, body in enumerate(scene.bodies))
+    each = [_integrals(body, place, screws, x, b, sums)[:, 0] for b, body in enumerate(scene.bodies)]
+    sizes = np.sum(each, axis=0)
     found: Array = (sizes.reshape(3, m, m, 4) * (1j ** -np.arange(4))).sum(axis=-1) / 4
     return found
 

@@ -86,8 +86,8 @@ def steady(
     """
     require_scene(scene)
     found, values = list[tuple[Assembled, Found]](), speed_list(speeds)
-    for one in steady_states(scene, values, turn, time):
-        found.append(one)
+    for pair in steady_states(scene, values, turn, time):
+        found.append(pair)
         progress(len(found), max(1, len(values)))
     assembled = found[0][0]
     selected(assembled.system, outputs)

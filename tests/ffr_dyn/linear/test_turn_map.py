@@ -11,12 +11,13 @@ from test_analyses_kinematic import bar
 from test_dyn_plane import slider_crank as flexible_crank
 
 import ffr_dyn as fd
-from benchmarks.second_order_scenes import REFERENCES, beam
+import ffr_prep as fp
 from ffr_dyn.analyses.rotating.periodic import floquet_lines
 from ffr_dyn.functions.time_functions import evaluate
 from ffr_dyn.functions.together import alone
 from ffr_prep.common.errors import InputError
 from ffr_prep.model.material import Material
+from ffr_prep.structures.frame import Member, named, polyline
 from ffr_prep.structures.sections import rectangle
 
 FORCED = 3.0  # rad/s
@@ -206,7 +207,10 @@ def test_a_spring_is_the_same_whichever_way_its_joint_is_drawn(turned):
 def four_bar(speed: float) -> fd.Scene:
     """A crank and rocker with a soft coupler, 0.1, 0.4, 0.3 and 0.4 m long, with weight."""
     steel, start, a, b, c, g = Material("steel", 2.1e11, 0.3, 7850.0), 0.5, 0.1, 0.4, 0.3, 0.4
-    coupler = beam(rectangle(0.02, 0.004), steel, b, 6, REFERENCES["supported"])
+    frame = polyline([(0, 0, 0), (b, 0, 0)], Member(rectangle(0.02, 0.004), steel, (0, 1.0, 0)), elements=24)
+    model = fp.from_frame(named(frame, a=(0, 0, 0), b=(b, 0, 0)), [fp.InterfaceRegion("a"), fp.InterfaceRegion("b")])
+    how = fp.Request(name="coupler", reference=fp.SimplySupported("a", "b"), reduction=fp.CraigBampton(6))
+    coupler = fp.reduce(model, how)
     A, D = a * np.array([np.cos(start), np.sin(start), 0]), np.array([g, 0, 0])
     d = np.linalg.norm(D - A)
     lean = np.arctan2(-A[1], g - A[0]) + np.arccos((b**2 + d**2 - c**2) / (2 * b * d))
@@ -216,7 +220,7 @@ def four_bar(speed: float) -> fd.Scene:
         fd.Body("coupler", coupler, position=A, rotation=(0, 0, lean), damping=0.02),
         fd.Body("rocker", bar("rocker", c), position=D, rotation=(0, 0, np.arctan2(B[1], B[0] - g))),
     )
-    ends = (("ground.O", "crank.a"), ("crank.b", "coupler.root"), ("coupler.tip", "rocker.b"), ("ground.D", "rocker.a"))
+    ends = (("ground.O", "crank.a"), ("crank.b", "coupler.a"), ("coupler.b", "rocker.b"), ("ground.D", "rocker.a"))
     joints = tuple(fd.Joint(f"at_{k}", "revolute", *both) for k, both in enumerate(ends))
     motor = fd.Driver("motor", "at_0", fd.polynomial(start, speed))
     return fd.Scene(bodies, joints, (motor,), ground={"O": (0, 0, 0), "D": (g, 0, 0)}, gravity=(0, -9.81, 0))
