@@ -216,7 +216,7 @@ def linearise(
     screws = screws_of(where[1], assembled.x, assembled.v)
     seen, whirl = whirls(*where, screws, assembled.x, rates_of(solved.values, len(parts), solved.shift), parts)
     ways = ways_of(seen, whirl)
-    rates_seen = np.where([bool(way) for way in ways], np.abs(seen), np.abs(solved.values))
+    rates_seen = np.hypot(solved.values.real, np.where([bool(way) for way in ways], seen, solved.values.imag))
     leading = in_words(*where, assembled.x, near.M, modes, rates_seen, ways)
     names = tuple(item if isinstance(item, str) else item.name for item in inputs)
     evaluate(at, time, assembled.x, assembled.v)

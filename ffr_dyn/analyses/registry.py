@@ -90,8 +90,12 @@ class OverTime(Analysis):
 class OfMoment(Analysis):
     """An analysis at one time (with `MomentSettings`).
 
+    counts : whether it tells how much of how much is done, by a `progress` of two numbers
+
     >>> issubclass(fd.Static, fd.OfMoment)
     """
+
+    counts: ClassVar[bool] = False
 
 
 Kind = TypeVar("Kind", bound=type[Analysis])

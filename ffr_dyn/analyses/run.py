@@ -19,9 +19,10 @@ def run(
     *,
     path: str | Path | None = None,
     resume: str | Path | None = None,
-    progress: Callable[[float], None] | None = None,
+    progress: Callable[..., None] | None = None,
 ) -> Result:
-    """Analyse a scene as its settings say; `path`, `resume` and `progress` are those of `forward`.
+    """Analyse a scene as its settings say; `path`, `resume` and `progress` are those of `forward`, or of
+    analyses that count what is done.
 
     Raises InputError for what the analysis cannot do, and when another than a forward run is to be resumed.
 
@@ -29,7 +30,7 @@ def run(
     >>> result = fd.run(scene, settings)
     """
     how: dict[str, Any] = {"path": path}
-    if isinstance(settings, Settings):
+    if isinstance(settings, Settings) or (settings.analysis.counts and progress is not None):
         how["progress"] = progress
     if resume is not None:
         require_resumable(settings)

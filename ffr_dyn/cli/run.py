@@ -225,12 +225,15 @@ def analysed(
     from ffr_dyn.analyses.run import require_resumable
     from ffr_dyn.analyses.run import run as analyse
     from ffr_dyn.analyses.settings import Settings
-    from ffr_dyn.cli.progress_bar import progress
+    from ffr_dyn.cli.progress_bar import counted, progress
 
     if resume:
         require_resumable(settings)
     reserve("-o", output, usual=".nc")
-    if not isinstance(settings, Settings):
+    if not isinstance(settings, Settings) and not settings.analysis.counts:
         return analyse(scene, settings, path=output)
+    if not isinstance(settings, Settings):
+        with counted(scene.name) as count:
+            return analyse(scene, settings, path=output, progress=count)
     with progress(scene.name, settings.end, start=settings.start) as update:
         return analyse(scene, settings, path=output, resume=output if resume else None, progress=update)

@@ -48,9 +48,10 @@ class Chart:
 
 
 def chart(at: Evaluator, time: float, x: Array, v: Array) -> Chart:
-    """The chart around a state (x, v) that meets the constraints."""
+    """The chart around a state (x, v) that meets the constraints. From there angles count their turns."""
     scene, place = at.system.scene, at.system.layout
     now = evaluate(at, time, x, v)
+    at.work.loads.reference[:] = at.work.loads.measured
     M = total_mass_matrix(scene, place, x)
     Z = free_motions(now.jacobian, M)
     movement = np.abs(Z / sizes(at)[:, None]).max(axis=0, initial=0.0)
@@ -156,13 +157,18 @@ def sizes(at: Evaluator) -> Array:
 
 def sizes_of(system: System) -> Array:
     """(V,) what counts as a movement of one: a radian, the size of the scene; of an elastic coordinate, that over sqrt(m)."""
-    place, scene = system.layout, system.scene
-    points = [i.position for body in scene.bodies for i in body.model.interfaces]
-    extent = max((float(np.linalg.norm(p)) for p in points), default=0.0)
-    inertia = [np.sqrt(np.trace(body.model.rr_dm) / body.model.mass) for body in scene.bodies]
-    length = max(extent, *map(float, inertia))
+    place, length = system.layout, length_of(system)
     sizes = np.ones(place.v_size)
-    for b, body in enumerate(scene.bodies):
+    for b, body in enumerate(system.scene.bodies):
         sizes[place.R_dot(b)] = length
         sizes[place.q_dot(b)] = length * np.sqrt(body.model.mass)
     return sizes
+
+
+def length_of(system: System) -> float:
+    """[m] of a scene: to the farthest interface of a body, or the largest radius of gyration."""
+    scene = system.scene
+    points = [i.position for body in scene.bodies for i in body.model.interfaces]
+    extent = max((float(np.linalg.norm(p)) for p in points), default=0.0)
+    inertia = [np.sqrt(np.trace(body.model.rr_dm) / body.model.mass) for body in scene.bodies]
+    return max(extent, *map(float, inertia))

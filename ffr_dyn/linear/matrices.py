@@ -15,9 +15,10 @@ import numpy as np
 
 from ffr_dyn.equations.layout import to_body_axes
 from ffr_dyn.functions.rotation import skew
-from ffr_dyn.linear.eigen import eigen
+from ffr_dyn.linear.eigen import Eigen, eigen
 from ffr_dyn.linear.hill import Varying, hill
 from ffr_dyn.linear.steady_state import Steady
+from ffr_dyn.linear.whirl import parted
 from ffr_prep.common.arrays import Array
 
 
@@ -55,13 +56,21 @@ def modes_of(found: Steady) -> Modes:
     mean, varying = eigen(of.K, of.C), _varying(found, of)
     step = varying.step if varying.rate else 0
     if not step:
-        return Modes(mean.values, mean.vectors[None], mean.free, 0.0)
+        return Modes(mean.values, _parted(found, mean)[None], mean.free, 0.0)
     all_of = hill(varying)
     order = np.lexsort((np.sign(all_of.values.imag), np.round(np.abs(all_of.values), 9)))
     values, parts, h = all_of.values[order], all_of.parts[..., order], len(all_of.parts) // 2
     values[: mean.free], parts[..., : mean.free] = 0.0, 0.0
     parts[h, :, : mean.free] = mean.vectors[:, : mean.free]
     return Modes(values, parts, mean.free, step * varying.rate)
+
+
+def _parted(found: Steady, of: Eigen) -> Array:
+    """(d, 2 d) vectors, forward and backward whirls of one eigenvalue apart."""
+    machine, Z = found.machine, found.Z
+    shapes = parted(machine.system.scene, machine.place, machine.screws, found.x, of.values, Z @ of.vectors)
+    vectors: Array = Z.T @ found.about.M @ shapes
+    return vectors
 
 
 def over_turn(found: Steady, H: int) -> Array:

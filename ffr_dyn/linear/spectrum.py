@@ -48,7 +48,7 @@ class Spectrum:
     @property
     def names(self) -> tuple[str, ...]:
         ways = ways_of(self.seen, self.whirl)
-        rates = np.where([bool(way) for way in ways], np.abs(self.seen), np.abs(self.values))
+        rates = np.hypot(self.values.real, np.where([bool(way) for way in ways], self.seen, self.values.imag))
         system, shapes = self.found.machine.system, main_parts(self.parts)
         return in_words(system.scene, system.layout, self.found.x, self.found.about.M, shapes, rates, ways)
 

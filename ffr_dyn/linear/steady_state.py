@@ -37,6 +37,7 @@ from ffr_dyn.equations.spinning import spinning
 from ffr_dyn.equations.statics import balance, damping
 from ffr_dyn.functions.rotation import from_vector, product, rotation_matrix
 from ffr_dyn.linear.hill import harmonics
+from ffr_dyn.linear.turning_on import turning_on
 from ffr_dyn.scene.force_kinds import forces_of
 from ffr_dyn.scene.forces.force import Force
 from ffr_dyn.scene.forces.places import AtMarker, OnBody
@@ -399,7 +400,7 @@ def _newton(machine: Machine, x: Array) -> Steady | None:
         if _balanced(steady):
             return steady
         closing = smallest_step(about.jacobian, about.M, -about.Phi)
-        y = closing + Z @ _solved(steady, Z.T @ (about.forces - about.K @ closing))
+        y = closing + _solved(steady, about.forces - about.K @ closing)
         length = float(np.abs(y / size).max())
         if not np.isfinite(length):
             return None
@@ -429,12 +430,26 @@ def _multipliers(about: Matrices, forces: Array) -> Array:
 
 
 def _solved(near: Steady, forces: Array) -> Array:
-    """(d,) the smallest free motion that balances them; none along what has no stiffness."""
-    if not forces.size:
-        return forces
-    U, values, W = np.linalg.svd(near.Z.T @ near.about.K @ near.Z)
+    """(V,) the smallest free motion that balances forces (V,); none along what has no stiffness, or turns on by itself."""
+    g, complete = _turning_on(near)
+    Z = near.Z @ complete[:, g:]
+    if not Z.size:
+        return np.zeros(forces.size)
+    U, values, W = np.linalg.svd(Z.T @ near.about.K @ Z)
     stiff = values > _neutral(near, values)
-    return W[stiff].T @ ((U.T @ forces)[stiff] / values[stiff])
+    found: Array = Z @ (W[stiff].T @ ((U.T @ (Z.T @ forces))[stiff] / values[stiff]))
+    return found
+
+
+def _turning_on(near: Steady) -> tuple[int, Array]:
+    """How many free motions only turn on what turns by itself; with them first, (d, d) free motions that are orthogonal."""
+    system, about = near.machine.system, near.about
+    now = At(system.scene, system.layout, near.machine.time, near.x, near.v)
+    looking = any(_looks(now, force) for force in forces_of(system.scene))
+    V = to_body_axes(system.layout, near.x, near.v)
+    motions = near.Z.T @ about.M @ turning_on(system, about.jacobian, V, sizes_of(system), looking)
+    count = motions.shape[1]
+    return count, np.linalg.qr(motions, mode="complete")[0] if count else np.eye(len(motions))
 
 
 def _neutral(near: Steady, values: Array) -> float:
@@ -447,7 +462,8 @@ def _require_balance(found: Steady) -> None:
     about, Z = found.about, found.Z
     left = Z.T @ about.forces
     U, values, _ = np.linalg.svd(Z.T @ about.K @ Z)
-    loose = U[:, values <= _neutral(found, values)]
+    g, complete = _turning_on(found)
+    loose = np.concatenate([U[:, values <= _neutral(found, values)], complete[:, :g]], axis=1)
     along = loose.T @ left
     if np.abs(along).max(initial=0.0) <= UNBALANCED * _size_of_forces(found):
         return
@@ -486,11 +502,16 @@ def _not_lasting(found: Steady) -> InputError | None:
     turned = np.abs(about.jacobian @ (found.Z / np.abs(found.Z / size[:, None]).max(axis=0, initial=1e-300))).max(
         axis=1, initial=0.0
     )
-    bad = np.maximum(opened, turned)
-    if bad.max(initial=0.0) <= OPENS * max(1.0, float(size.max())):
+    bad, limit = np.maximum(opened, turned), OPENS * max(1.0, float(size.max()))
+    if bad.max(initial=0.0) <= limit:
         return None
     names = [block.name for block in machine.system.blocks for _ in block.words]
     worst = int(np.argmax(bad[: len(names)])) if names else 0
+    if opened.max(initial=0.0) <= limit:
+        return InputError(
+            f"about the steady motion {names[worst]!r} lets bodies that turn at different speeds move aside together, which "
+            "has no constant axes: put a stiff Bushing in its place, which may turn freely, or take `periodic` with floquet"
+        )
     return InputError(
         f"no steady motion: with every body turning on at a constant speed, {names[worst]!r} does not hold; a machine whose "
         "bodies do not all turn evenly, about axes that stay, has a periodic motion: `periodic`"

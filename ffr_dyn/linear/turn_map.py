@@ -1,15 +1,9 @@
 """Periodic motions of driven scenes: the state that a period brings back, and what becomes of small deviations from it.
 
-With P the map of a state over one period by the compiled loop, and deviations in minimal coordinates
-(`ffr_dyn.consistency.tangent`), a periodic motion is a fixed point s = P(s). A motion that settles is found by
-Anderson's mixing of successive periods, which for a linear map is GMRES on s - P(s) = 0 and needs about as many
-periods as there are deviations that decay slowly. These are computed with steps COARSER times as long; a period of half
-these steps then tells what becomes of it with the right ones, by the order of the method. From there a period of the right
-steps is corrected by the derivative of that estimate in place of its own (defect correction): two suffice. The first of the
-two is the second period of the scene, the last the first, so that both come back. What does not settle by itself is found by
-Newton's method, whose matrix, of differences, is the monodromy matrix. Its eigenvalues are Floquet's multipliers: small
-motions grow where one is larger than one. (Walker & Ni, SIAM J. Numer. Anal. 49 (2011) 1715-1735; Stetter, Numer. Math. 29
-(1978) 425-443; Seydel 2010.)
+P maps a state to that a period later by the compiled loop, in minimal coordinates of deviations from a state
+(`ffr_dyn.consistency.tangent`); a periodic motion is a fixed point s = P(s), which `ffr_dyn.linear.returning` finds. The
+eigenvalues of the monodromy matrix, the derivative of P there by differences, are Floquet's multipliers: small motions grow
+where one is larger than one. (Seydel, Practical Bifurcation and Stability Analysis 2010, ch. 7.)
 """
 
 from __future__ import annotations
@@ -23,9 +17,9 @@ import numpy as np
 from ffr_dyn.compile.engine import fill_rows, new_engine
 from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.compile.workspace import new_record
-from ffr_dyn.consistency.evaluation import evaluate, evaluator
+from ffr_dyn.consistency.evaluation import Evaluator, evaluate, evaluator
 from ffr_dyn.consistency.failure import failure
-from ffr_dyn.consistency.tangent import STEP, Chart, chart, sizes_of
+from ffr_dyn.consistency.tangent import STEP, Chart, chart, length_of, sizes_of
 from ffr_dyn.equations.layout import Layout, moved, to_body_axes, to_global_axes
 from ffr_dyn.functions.rotation import rotation_matrix
 from ffr_dyn.functions.time_functions import evaluate as value_of
@@ -38,21 +32,10 @@ from ffr_dyn.scene.scene import Scene
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError, InputError
 
-ROWS = 100  # that a period's record has, or as many as steps
-PERIODS, KEPT = 60, 12  # of the mixing: at most, and how many are mixed
-NEWTONS = 8
-COARSER, FEWEST = (
-    10,
-    100,
-)  # times the steps, of periods that correct others, and how many of these a period has at least
-ROUGH = 1e-6  # closing of the coarse periods
-CORRECTED, FALLING = 6, 0.1  # periods that are corrected: at most, and by how much each must close better
-CLOSED = 1e-12  # of constraints over a period: what a projection leaves open would be a kick at every return
-RETURNS = 1e-10  # of a period that ends where it began: rad, or relative to the scene; rates times the period
-STALLED = 0.7  # of a period's closing over that of KEPT periods before, from where mixing gives way to Newton's method
-DIFFERENCE = 1e-5  # the same, of derivatives of a period; those of the monodromy matrix are extrapolated
+ROWS = 100  # the steps of a period are as many or a multiple
+CLOSED = 1e-13  # of constraints, relative to the scene: what is left open kicks stiff bodies at every return
+DIFFERENCE = 1e-5  # rad, or relative to the scene; of derivatives of a period, which are extrapolated
 LATER = 0.37  # s: when a driver is asked again whether it turns evenly
-REPEATS = 1e-7  # of the second period, the same: drivers and loads that come back
 CORRECTIONS, MET = 12, 1e-13  # of a deviation onto the constraints, and of Phi [m, -]
 AGAIN = 0.5  # rad, or the scene's size: of deviations beyond which a state does not count as come back
 
@@ -87,11 +70,19 @@ def turns(system: System, time: float, x: Array, v: Array, method: Integrator, p
     """The map over a period; the state (x, v) meets the constraints."""
     steps = max(1, round(period / method.step))
     steps = steps if steps < ROWS else -(-steps // ROWS) * ROWS
-    near = chart(evaluator(system), time, x, v)
-    jacobian = evaluate(near.at, time, x, v).jacobian
     shortened: Any = method
-    across, sizes = np.linalg.solve(near.M, jacobian.T), sizes_of(system)
-    return Turns(near, across, sizes, replace(shortened, step=period / steps), period, steps)
+    return _about(evaluator(system), time, x, v, replace(shortened, step=period / steps), period, steps)
+
+
+def turns_about(of: Turns, x: Array, v: Array) -> Turns:
+    """The same map about another state near the chart's."""
+    return _about(of.near.at, of.near.time, x, v, of.method, of.period, of.steps)
+
+
+def _about(at: Evaluator, time: float, x: Array, v: Array, method: Integrator, period: float, steps: int) -> Turns:
+    near = chart(at, time, x, v)
+    jacobian = evaluate(near.at, time, x, v).jacobian
+    return Turns(near, np.linalg.solve(near.M, jacobian.T), sizes_of(at.system), method, period, steps)
 
 
 def period_of(scene: Scene, time: float) -> float:
@@ -112,7 +103,9 @@ def period_of(scene: Scene, time: float) -> float:
 def after(of: Turns, x: Array, v: Array, *, rows: int = 1, later: float = 0.0) -> Record:
     """`rows` states of the period that begins at (x, v), evenly, the last at its end; or of one that begins `later` [s]."""
     start = of.near.time + later
-    engine = new_engine(of.system, x, v, of.method, gains(Projection(CLOSED)), start=start, spacing=of.method.step)
+    closed = gains(Projection(CLOSED * length_of(of.system)))
+    engine = new_engine(of.system, x, v, of.method, closed, start=start, spacing=of.method.step)
+    engine.work.loads.reference[:] = of.near.at.work.loads.reference
     record = new_record(of.system, rows)
     status = fill_rows(engine, record, start, of.steps // rows)
     if status != OK:
@@ -150,7 +143,8 @@ def deviation(of: Turns, x: Array, v: Array) -> Array:
     if np.abs(y / of.sizes).max() > AGAIN:
         raise ComputationError(
             f"after a period of {of.period:.6g} s the scene is not where it began: the period is not that of its drivers and "
-            "loads, or a body goes on turning; give another period"
+            "loads, or a body goes on turning (give another period), or bodies swing up to the speed of what drives them "
+            "(give them its velocity)"
         )
     return np.concatenate([near.W.T @ y, near.W.T @ (V - near.V)])
 
@@ -177,163 +171,6 @@ def mapped(of: Turns, s: Array) -> Array:
     """(2 d,) the deviation a period later."""
     record = after(of, *placed(of, s))
     return deviation(of, record.x[-1], record.v[-1])
-
-
-@dataclass(frozen=True)
-class Returned:
-    """A periodic state (x, v) and the record of its period, evenly, from after the beginning to the end; how many periods
-    were computed, coarse ones being parts of one; by how much it does not return, relative; whether by Newton's method."""
-
-    x: Array
-    v: Array
-    record: Record
-    periods: float
-    error: float
-    newton: bool
-
-
-def returned(of: Turns) -> Returned:
-    """The periodic state near the chart's. Raises ComputationError where there is none."""
-    return _corrected(of) or _in_fine_steps(of)
-
-
-def _in_fine_steps(of: Turns) -> Returned:
-    s, _, periods, error = _mixed(of, _Known([], []), RETURNS)
-    s = s * of.scale
-    newton = not error <= RETURNS
-    if newton:
-        s, more, error = _newton(of, s)
-        periods += more
-    x, v = placed(of, s)
-    record = after(of, x, v, rows=min(ROWS, of.steps))
-    _check_repeats(of, x, v, deviation(of, record.x[-1], record.v[-1]), error)
-    return Returned(x, v, record, periods + 2, error, newton)
-
-
-def _check_repeats(of: Turns, x: Array, v: Array, image: Array, error: float) -> None:
-    """That the second period does with a state what the first does, which maps it to a deviation."""
-    again = after(of, x, v, later=of.period)
-    apart = float(np.abs((deviation(of, again.x[-1], again.v[-1]) - image) / of.scale).max(initial=0.0))
-    if apart > max(REPEATS, 1e3 * error):
-        raise ComputationError(
-            f"what acts on the scene does not repeat itself after {of.period:.6g} s: the period after the first ends "
-            f"{apart:.2g} of the scene's size off; give a period in which drivers and loads all come back"
-        )
-
-
-@dataclass(frozen=True)
-class _Known:
-    """The known pairs of a map: points and their images (2 d,), in units of the scale."""
-
-    points: list[Array]
-    images: list[Array]
-
-    def step(self, closing: Array) -> Array:
-        """(2 d,) (1 - M)^-1 closing with the derivative M of the map as far as it is known; where it is not, M = 0."""
-        points, images = np.array(self.points[-KEPT:]), np.array(self.images[-KEPT:])
-        if len(points) < 2:
-            return closing
-        shares = np.linalg.lstsq(np.diff(images - points, axis=0).T, closing, rcond=1e-12)[0]
-        found: Array = closing - shares @ np.diff(images, axis=0)
-        return found
-
-
-def _in_steps(of: Turns, steps: int) -> Turns:
-    """The map with another number of steps."""
-    method: Any = of.method
-    return replace(of, steps=steps, method=replace(method, step=of.period / steps))
-
-
-def _corrected(of: Turns) -> Returned | None:
-    """By defect correction; None where coarse steps do not carry it."""
-    try:
-        estimate = _estimate(of)
-        return _corrected_by(of, estimate) if estimate else None
-    except ComputationError:
-        return None
-
-
-@dataclass(frozen=True)
-class _Estimate:
-    """Of the map with the right steps by coarse ones and their halves.
-
-    known : of the map with coarse steps;  s, image : (2 d,) a point that it brings back, and the estimated image
-    begun, each : periods that it took, and that one image takes
-    """
-
-    of: Turns
-    coarse: int
-    known: _Known
-    s: Array
-    image: Array
-    begun: float
-    each: float
-
-    def step(self, closing: Array) -> Array:
-        """(2 d,) (1 - M)^-1 closing with the derivative of the estimate, along one direction."""
-        step = self.known.step(closing)
-        small = DIFFERENCE / max(np.abs(step).max(initial=0.0), 1e-300)
-        image = _estimated(self.of, self.coarse, self.s + small * step)
-        found: Array = step + self.known.step(closing - step + (image - self.image) / small)
-        return found
-
-
-def _estimate(of: Turns) -> _Estimate | None:
-    """Near the state that coarse steps bring back; None where they are too few, or bring back none."""
-    coarse = max(FEWEST, of.steps // COARSER)
-    if 2 * coarse >= of.steps:
-        return None
-    known = _Known([], [])
-    s, image, count, error = _mixed(_in_steps(of, coarse), known, ROUGH)
-    if not error <= ROUGH:
-        return None
-    parts = coarse / of.steps
-    return _Estimate(of, coarse, known, s, _estimated(of, coarse, s, image), (count + 2) * parts, 3 * parts)
-
-
-def _estimated(of: Turns, coarse: int, s: Array, image: Array | None = None) -> Array:
-    """(2 d,) the image of a deviation by the right steps, in units of the scale; `image` by coarse ones is known, perhaps.
-    Errors go as the step to the power of the method's order."""
-    at, power = s * of.scale, of.method.order
-    image = mapped(_in_steps(of, coarse), at) / of.scale if image is None else image
-    change = mapped(_in_steps(of, 2 * coarse), at) / of.scale - image
-    found: Array = image + change * (1 - (coarse / of.steps) ** power) / (1 - 0.5**power)
-    return found
-
-
-def _corrected_by(of: Turns, estimate: _Estimate) -> Returned | None:
-    """Periods of the right steps, until the first of the scene returns; in turn with its second, until both do the same."""
-    s, errors, repeats = estimate.s + estimate.known.step(estimate.image - estimate.s), list[float](), False
-    while len(errors) < CORRECTED:
-        x, v = placed(of, s * of.scale)
-        first = repeats or len(errors) % 2 == 1
-        record = after(of, x, v, rows=min(ROWS, of.steps) if first else 1, later=0.0 if first else of.period)
-        closing = deviation(of, record.x[-1], record.v[-1]) / of.scale - s
-        errors.append(float(np.abs(closing).max(initial=0.0)))
-        if first and errors[-1] <= RETURNS:
-            periods = estimate.begun + len(errors) + (len(errors) - 1) * estimate.each
-            return Returned(x, v, record, periods, errors[-1], newton=False)
-        if first and errors[-1] > FALLING * errors[-2]:
-            return None
-        repeats |= first and errors[-1] <= REPEATS
-        s = s + estimate.step(closing)
-    return None
-
-
-def _mixed(of: Turns, known: _Known, tolerance: float) -> tuple[Array, Array, int, float]:
-    """By Anderson's mixing, the state that the map brings back: its deviation and its image in units of the scale, how many
-    periods, and the last closing. What is known of the map grows."""
-    scale, errors, s = of.scale, list[float](), np.zeros(of.scale.size)
-    while len(errors) < PERIODS:
-        image = mapped(of, s * scale) / scale
-        known.points.append(s)
-        known.images.append(image)
-        errors.append(float(np.abs(image - s).max(initial=0.0)))
-        if errors[-1] <= tolerance or (len(errors) > KEPT and errors[-1] > STALLED * errors[-1 - KEPT]):
-            break
-        s = s + known.step(image - s)
-    best = int(np.argmin(errors[-KEPT:])) - min(KEPT, len(errors))
-    return known.points[best], known.images[best], len(errors), errors[best]
 
 
 def monodromy(of: Turns, s: Array) -> Array:
@@ -410,20 +247,3 @@ def floquet_shape(of: Turns, modes: FloquetModes, number: int, rows: int) -> Arr
             shape[k] += unit * (forth - back) / (2 * DIFFERENCE)
     times = of.period / rows * np.arange(1, rows + 1)
     return shape * np.exp(-modes.exponents[number] * times)[:, None]
-
-
-def _newton(of: Turns, s: Array) -> tuple[Array, int, float]:
-    scale, periods, error = of.scale, 0, np.inf
-    for _ in range(NEWTONS):
-        closing = (mapped(of, s) - s) / scale
-        error = float(np.abs(closing).max(initial=0.0))
-        periods += 1
-        if error <= RETURNS:
-            return s, periods, error
-        M = monodromy(of, s)
-        periods += 4 * s.size
-        s = s + scale * np.linalg.lstsq(np.eye(s.size) - M, closing, rcond=1e-10)[0]
-    raise ComputationError(
-        f"no motion of period {of.period:.6g} s was found: after {NEWTONS} of Newton's steps a period still ends {error:.2g} "
-        "of the scene's size from where it began; give a period that fits drivers and loads, or begin nearer to the motion"
-    )

@@ -11,6 +11,7 @@ ground: an ellipse. What vibrates along the axis is seen as it is.
 from __future__ import annotations
 
 import numpy as np
+from scipy.linalg import eigh
 
 from ffr_dyn.equations.layout import Layout
 from ffr_dyn.functions.rotation import rotation_matrix, triad
@@ -22,6 +23,7 @@ from ffr_prep.common.arrays import Array
 ONE_WAY = 0.7  # of a whirl's amplitude is its larger part, from where the smaller is called a deviation
 ALONG = 0.4  # of what moves across the axis, turning of sections included, from where a motion is one along the axis
 ONE = 1e-6  # of frequencies that are one, relative to the speed
+EQUAL = 1e-8  # of eigenvalues that are one, relative
 LEAST = 1e-6  # of a turning relative to the fastest body's: what counts as turning
 
 
@@ -57,6 +59,38 @@ def _from_the_ground(speed: float, rates: Array, forth: Array, back: Array) -> t
     forward = sizes[same[best] & (found > 0)].sum() >= sizes[same[best] & (found <= 0)].sum()
     frequency = float(abs(found[best]))
     return frequency if forward else -frequency, float(amplitudes[best] / amplitudes[groups].sum())
+
+
+def parted(scene: Scene, place: Layout, screws: Screws, x: Array, values: Array, shapes: Array) -> Array:
+    """Shapes (V, m) of vibrations at eigenvalues (m,), those at one eigenvalue as whirls forward and backward.
+
+    Of a thin disc whose tilting about both axes is alike, both whirls have one frequency in the turning axes, and any sum of
+    them is a mode. Those are wanted that have the most of one whirl and the least of the other.
+    """
+    if not screws.fastest:
+        return shapes
+    found = shapes.copy()
+    upper = np.flatnonzero(values.imag > 0)
+    while upper.size:
+        same = np.abs(values[upper] - values[upper[0]]) <= EQUAL * np.abs(values[upper[0]])
+        one, upper = upper[same], upper[~same]
+        if one.size > 1:
+            ways = _forms(scene, place, screws, x, shapes[:, one])
+            found[:, one] = shapes[:, one] @ eigh(ways[0] - ways[1], ways.sum(axis=0))[1]
+            lower = np.flatnonzero(np.abs(values - values[one[0]].conj()) <= EQUAL * np.abs(values[one[0]]))
+            found[:, lower] = found[:, one].conj()
+    return found
+
+
+def _forms(scene: Scene, place: Layout, screws: Screws, x: Array, shapes: Array) -> Array:
+    """(3, m, m) Hermitian forms of `_integrals` over all bodies, of sums of the shapes (V, m): by polarisation."""
+    m = shapes.shape[1]
+    i, j, k = (one.ravel() for one in np.meshgrid(range(m), range(m), range(4), indexing="ij"))
+    sums = (shapes[:, i] + 1j**k * shapes[:, j])[None]
+    each = [_integrals(body, place, screws, x, b, sums)[:, 0] for b, body in enumerate(scene.bodies)]
+    sizes = np.sum(each, axis=0)
+    found: Array = (sizes.reshape(3, m, m, 4) * (1j ** -np.arange(4))).sum(axis=-1) / 4
+    return found
 
 
 def ways_of(seen: Array, share: Array) -> list[str]:

@@ -2,21 +2,29 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 
 from ffr_dyn.pictures.histories import PALETTE, drawing
 from ffr_dyn.results.result import Result
+from ffr_prep.common.arrays import Array
 
 LEAST = 0.1  # % of damping that the picture shows, so that it does not enlarge rounding
+APART = 0.032  # of the height: names of vibrations
+GREY, RED = "#666666", "#D55E00"
+SMALL = 9.0  # points of letters
 
 
 def draw_campbell(result: Result, path: str | Path) -> Path:
     """Draw a Campbell diagram, as `campbell` returns it, and the damping over the speed: .png, .svg or .pdf.
 
-    Whirls are drawn with their frequencies from the ground, backward ones dashed; what does not whirl in its turning axes.
-    Lines from the origin are orders, circles on them critical speeds.
+    Every line has the name of its vibration at its end. Whirls are drawn with their frequencies from the ground, backward
+    ones dashed; what does not whirl in its turning axes. Lines from the origin are orders (1x, 2x), circles on them critical
+    speeds, with their numbers [rad/s]. Where a vibration begins to grow, a line goes down to the damping.
 
         fd.draw_campbell(fd.campbell(scene, speeds=range(0, 500, 25)), "campbell.png")
 
@@ -27,24 +35,60 @@ def draw_campbell(result: Result, path: str | Path) -> Path:
     a, speed = result.attributes, result["speed"]
     whirling = np.array(a["whirling"], bool)
     shown = np.where(whirling, np.abs(result["seen"]), result["frequencies"])
-    with drawing(path, (10.0, 8.0)) as figure:
+    backward = whirling & (result["seen"][len(speed) // 2] < 0)
+    top = 1.08 * float(shown.max(initial=1e-12))
+    with drawing(path, (11.0, 8.0)) as figure:
         upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(3, 1))
-        for m, name in enumerate(a["names"]):
-            backward = whirling[m] and result["seen"][len(speed) // 2, m] < 0
-            color = PALETTE[m % len(PALETTE)]
-            upper.plot(speed, shown[:, m], "--" if backward else "-", color=color, label=name)
-            lower.plot(speed, 100 * result["damping_ratios"][:, m], color=color)
-        for order in sorted({one["order"] for one in a["critical"]}):
-            upper.plot(speed, order * speed / (2 * np.pi), ":", color="#888888", linewidth=1.0)
+        upper.set(ylim=(0, top), xlim=(speed[0], speed[-1]), ylabel="frequency [Hz]")
+        for m in range(len(a["names"])):
+            how: dict[str, Any] = {"color": PALETTE[m % len(PALETTE)], "linestyle": "--" if backward[m] else "-"}
+            upper.plot(speed, shown[:, m], **how)
+            lower.plot(speed, 100 * result["damping_ratios"][:, m], **how)
+        _name_lines(upper, a["names"], shown[-1])
+        _draw_orders(upper, a["orders"], float(speed[-1]), top)
         for one in a["critical"]:
-            upper.plot(one["speed"], one["order"] * one["speed"] / (2 * np.pi), "o", color="#000000", markersize=5)
+            _mark(upper, one["speed"], one["order"] * one["speed"] / (2 * np.pi), one["mode"].endswith("backward"))
         for one in a["limits"]:
-            lower.axvline(one["speed"], color="#D55E00", linewidth=1.0)
-        upper.set_ylim(0, 1.05 * float(shown.max(initial=1e-12)))
-        upper.set_ylabel("frequency [Hz]")
+            for axes in (upper, lower):
+                axes.axvline(one["speed"], color=RED, linewidth=1.0)
+            lower.annotate(f" unstable from {one['speed']:.4g}", (one["speed"], 0.9), xycoords=("data", "axes fraction"),
+                           color=RED, fontsize=SMALL)  # fmt: skip
         low, high = lower.get_ylim()
-        lower.set_ylim(min(low, -LEAST), max(high, LEAST))
-        lower.set_ylabel("damping [%]")
-        lower.set_xlabel("speed [rad/s]")
-        upper.legend(loc="upper left", bbox_to_anchor=(1.0, 1.02))
+        lower.set(ylim=(min(low, -LEAST), max(high, LEAST)), ylabel="damping [%]", xlabel="speed [rad/s]")
+        upper.secondary_xaxis("top", functions=(_to_rpm, _from_rpm)).set_xlabel("speed [rpm]")
     return Path(path)
+
+
+def _to_rpm(speed: Array) -> Array:
+    return speed * 30 / np.pi
+
+
+def _from_rpm(speed: Array) -> Array:
+    return speed * np.pi / 30
+
+
+def _mark(axes: Axes, speed: float, frequency: float, backward: bool) -> None:
+    """With its number, of backward whirls on the other side of the line than of forward ones, which may be near."""
+    axes.plot(speed, frequency, "o", color="#000000", markersize=5)
+    at, side = ((-5, 5), "right") if backward else ((5, -11), "left")
+    axes.annotate(f"{speed:.4g}", (speed, frequency), at, textcoords="offset points", ha=side, fontsize=SMALL - 1)
+
+
+def _draw_orders(axes: Axes, orders: Sequence[float], last: float, top: float) -> None:
+    """Lines through the origin, each with its number where it leaves the picture."""
+    for order in orders:
+        end = min(last, 2 * np.pi * top / order) if order > 0 else last
+        axes.plot((0, end), (0, order * end / (2 * np.pi)), ":", color=GREY, linewidth=1.2)
+        axes.annotate(f"{order:g}x", (0.97 * end, order * 0.97 * end / (2 * np.pi)), (-4, 5), textcoords="offset points",
+                      color=GREY, fontsize=SMALL, ha="right")  # fmt: skip
+
+
+def _name_lines(axes: Axes, names: Sequence[str], ends: Array) -> None:
+    """Names beside the ends of lines, from below, none on another."""
+    height, last = float(axes.get_ylim()[1]), -np.inf
+    for m in np.argsort(ends, kind="stable"):
+        last = max(last + APART, float(ends[m]) / height)
+        axes.annotate(
+            names[m], (1.0, float(ends[m]) / height), (1.03, last), xycoords="axes fraction", color=PALETTE[m % len(PALETTE)],
+            fontsize=SMALL, va="center", arrowprops={"arrowstyle": "-", "color": PALETTE[m % len(PALETTE)], "linewidth": 0.6},
+        )  # fmt: skip

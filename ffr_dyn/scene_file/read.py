@@ -63,6 +63,9 @@ from ffr_prep.common.errors import InputError
 from ffr_prep.common.reading import reading
 
 # Files of other kinds, by an entry that a scene never has.
+_ANALYSIS = (
+    'write a table [analysis] with kind = "steady", "linearise" or another, or with end and output_step of a run'
+)
 _OTHERS = {
     "members": "a structure, of which `ffr-prep reduce-structure` makes a body",
     "shells": "a structure, of which `ffr-prep reduce-structure` makes a body",
@@ -170,6 +173,8 @@ def _with_nearest(item: Any, text: str) -> str:
     if item["type"] == "kind" and isinstance(item["input"], dict):
         given, known = item["input"].get("kind"), text.partition("there are ")[2].split(", ")
         text = text.replace("no such kind", f"no kind {given!r}")
+    elif item["type"] == "missing":
+        return "is required, and missing" + (f"; {_ANALYSIS}" if item["loc"] == ("analysis",) else "")
     elif item["type"] == "literal_error":
         given, known = item["input"], re.findall(r"'([^']*)'", text)
     else:

@@ -30,6 +30,7 @@ from ffr_dyn.scene.described import described
 from ffr_dyn.scene.scene import Scene, require_scene
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
+from ffr_prep.common.progress import no_count
 
 MODES = 10
 SECANTS, MET = 12, 1e-8  # of a crossing: steps, and of a speed relative to the range
@@ -43,6 +44,7 @@ class Campbell(OfMoment):
     """
 
     keeps: ClassVar[bool] = False
+    counts: ClassVar[bool] = True
     example: ClassVar[str] = (
         "ffr-dyn campbell rotor.toml --speed 0..500 --order 1 --picture out/campbell.png -o out/rotor.nc"
     )
@@ -62,8 +64,7 @@ class Campbell(OfMoment):
             check_picture(self.picture)
         orders = tuple(_order(text) for text in self.orders)
         found = campbell(
-            scene, speeds=speed_list(self.speeds), turn=self.turn, orders=orders, modes=self.modes, time=settings.time,
-            path=how["path"],
+            scene, speeds=speed_list(self.speeds), turn=self.turn, orders=orders, modes=self.modes, time=settings.time, **how
         )  # fmt: skip
         if self.picture:
             from ffr_dyn.pictures.campbell import draw_campbell
@@ -91,17 +92,19 @@ def campbell(
     modes: int = MODES,
     time: float = 0.0,
     path: str | Path | None = None,
+    progress: Callable[[int, int], None] = no_count,
 ) -> Result:
     """Frequencies and damping of a scene over a list of rising speeds [rad/s]: a row for each.
 
     turn   : what has the speed, as of `steady`;  orders : multiples of the speed that excite;  modes : how many, from the
-             slowest at the first speed
+             slowest at the first speed; limits of stability are those of all
+    progress : called with how much of how much is done, speeds and then vibrations
 
     The result has `speed` [rad/s], and of each vibration `frequencies` [Hz] in the turning axes and `seen` [Hz] from the
     ground, positive where the whirl is forward, both of the damped vibration; `damping_ratios` and `growth` [1/s]. Its
-    attributes have the `names` of the vibrations; `critical`, a list of {speed, order, mode, axes}, where a frequency crosses
-    an order: from the ground of what whirls, in the turning axes of what does not; and `limits`, a list of {speed, mode},
-    where one begins to grow. A crossing is a resonance only if a force of that order excites the mode.
+    attributes have the `names` of the vibrations; the `orders`; `critical`, a list of {speed, order, mode, axes}, where a
+    frequency crosses an order: from the ground of what whirls, in the turning axes of what does not; and `limits`, a list of
+    {speed, mode}, where one begins to grow. A crossing is a resonance only if a force of that order excites the mode.
 
         found = fd.campbell(scene, speeds=np.linspace(0, 500, 21))
         fd.draw_campbell(found, "campbell.png")
@@ -115,31 +118,35 @@ def campbell(
     if len(values) < 2 or not (np.diff(values) > 0).all():
         raise InputError(f"the speeds are {values}; give two or more that rise, such as 0..500")
     at = _at_speeds(scene, turn, time)
-    spectra = [at(values[0], None)]
-    for speed in values[1:]:
-        spectra.append(followed(spectra[-1], at(speed, spectra[-1])))
+    spectra = list[Spectrum]()
+    for speed in values:
+        one = at(speed, spectra[-1] if spectra else None)
+        spectra.append(followed(spectra[-1], one) if spectra else one)
+        progress(len(spectra), len(values) + min(modes, spectra[0].values.size))
     if not spectra[0].values.size:
         raise InputError("nothing vibrates: joints and the driver fix every motion, or what they leave is free")
     middle = spectra[len(spectra) // 2]
     whirling = np.nan_to_num(middle.whirl) > ONE_WAY
-    order = np.argsort(np.where(whirling, np.abs(spectra[0].seen), np.abs(spectra[0].values)), kind="stable")[:modes]
-    names = middle.only(order).names
-    critical = [
-        {"speed": speed, "order": float(k), "mode": name, "axes": "ground" if whirling[m] else "turning"}
-        for m, name in zip(order.tolist(), names, strict=True)
-        for k in orders
-        for speed in _crossings(at, values, spectra, m, _off_order(bool(whirling[m]), float(k)))
-    ]
-    limits = [
-        {"speed": speed, "mode": name}
-        for m, name in zip(order.tolist(), names, strict=True)
-        for speed in _crossings(at, values, spectra, m, _growth, upward=True)
-    ]
+    everything, called = _slowest(spectra, whirling), middle.names
+    order, critical = everything[:modes], list[dict[str, Any]]()
+    for count, m in enumerate(order.tolist(), 1):
+        critical += _criticals(at, values, spectra, m, bool(whirling[m]), orders, called[m])
+        progress(len(values) + count, len(values) + order.size)
+    limits = [{"speed": one, "mode": called[m]} for m in everything.tolist() for one in _limits(at, values, spectra, m)]
     kept = [one.only(order) for one in spectra]
-    found = _as_result(scene, time, values, kept, names, whirling[order], critical, limits)
+    crossed = {"orders": [float(k) for k in orders], "critical": critical, "limits": limits}
+    found = _as_result(scene, time, values, kept, [called[m] for m in order.tolist()], whirling[order], crossed)
     if path is not None:
         save_result(found, path)
     return found
+
+
+def _slowest(spectra: Sequence[Spectrum], whirling: Array) -> Array:
+    """Numbers of the vibrations by the moduli of their eigenvalues from the ground; last what only decays at all speeds."""
+    first = spectra[0]
+    modulus = np.hypot(first.values.real, np.where(whirling, first.seen, first.values.imag))
+    decays = np.all([np.abs(one.values.real) >= np.abs(one.values.imag) for one in spectra], axis=0)
+    return np.lexsort((modulus, decays))
 
 
 def _at_speeds(scene: Scene, turn: str, time: float) -> Callable[[float, Spectrum | None], Spectrum]:
@@ -164,9 +171,45 @@ def _off_order(ground: bool, order: float) -> Measure:
     return off
 
 
+def _criticals(
+    at: Callable[[float, Spectrum | None], Spectrum],
+    speeds: Sequence[float],
+    spectra: Sequence[Spectrum],
+    m: int,
+    ground: bool,
+    orders: Sequence[float],
+    name: str,
+) -> list[dict[str, Any]]:
+    """Where a vibration crosses orders, as in the attributes."""
+    axes = "ground" if ground else "turning"
+    return [
+        {"speed": speed, "order": float(k), "mode": name, "axes": axes}
+        for k in orders
+        for speed in _crossings(at, speeds, spectra, m, _off_order(ground, float(k)))
+    ]
+
+
 def _growth(speed: float, one: Spectrum, m: int) -> float:
-    value = one.values[m]
-    return float(value.real - GROWS * abs(value))
+    """[1/s]"""
+    return float(one.values[m].real)
+
+
+def _limits(
+    at: Callable[[float, Spectrum | None], Spectrum], speeds: Sequence[float], spectra: Sequence[Spectrum], m: int
+) -> list[float]:
+    """Speeds from where a vibration grows, each between two of the list: of one that is damped before, where it is damped no
+    more; of one that is not, where its growth is no rounding."""
+
+    def grown(speed: float, one: Spectrum, m: int) -> float:
+        return _growth(speed, one, m) - GROWS * float(abs(one.values[m]))
+
+    found = []
+    for k, (one, next_) in enumerate(pairwise(spectra)):
+        low, high = grown(speeds[k], one, m), grown(speeds[k + 1], next_, m)
+        if low < 0 < high:
+            damped = _growth(speeds[k], one, m) < -GROWS * abs(one.values[m])
+            found += _crossings(at, speeds[k : k + 2], (one, next_), m, _growth if damped else grown)
+    return found
 
 
 def _crossings(
@@ -175,13 +218,12 @@ def _crossings(
     spectra: Sequence[Spectrum],
     m: int,
     measure: Measure,
-    upward: bool = False,
 ) -> list[float]:
     """Speeds where a measure of a vibration is zero, each between two of the list."""
     measured = [measure(speed, one, m) for speed, one in zip(speeds, spectra, strict=True)]
     found = []
     for k, (low, high) in enumerate(pairwise(measured)):
-        if (low < 0 < high) or (low > 0 > high and not upward):
+        if low < 0 < high or low > 0 > high:
             found.append(_between(at, (speeds[k], speeds[k + 1]), (low, high), spectra[k], m, measure))
     return found
 
@@ -222,8 +264,7 @@ def _as_result(
     spectra: Sequence[Spectrum],
     names: Sequence[str],
     whirling: Array,
-    critical: list[dict[str, Any]],
-    limits: list[dict[str, Any]],
+    crossed: dict[str, Any],
 ) -> Result:
     values, seen = np.array([one.values for one in spectra]), np.array([one.seen for one in spectra])
     modes = Axis("vibration", tuple(str(k + 1) for k in range(len(names))))
@@ -246,8 +287,7 @@ def _as_result(
         "method": "exact tangents, vibrations followed by their shapes",
         "names": list(names),
         "whirling": [int(one) for one in whirling],
-        "critical": critical,
-        "limits": limits,
+        **crossed,
         "notes": notes,
         "status": "complete",
     }

@@ -22,7 +22,8 @@ from ffr_dyn.functions.time_functions import harmonic
 from ffr_dyn.integrators import ROS3
 from ffr_dyn.linear.continuation import Solution, branch, folds
 from ffr_dyn.linear.forced_turns import MARK, Wave, begun, over_amplitude, over_frequency, period, wave
-from ffr_dyn.linear.turn_map import returned, turns
+from ffr_dyn.linear.returning import returned
+from ffr_dyn.linear.turn_map import turns
 from ffr_dyn.results.file import save_result
 from ffr_dyn.results.result import Axis, Quantity, Result
 from ffr_dyn.scene.described import described

@@ -22,7 +22,8 @@ from ffr_dyn.consistency.evaluation import evaluator, joined, record_states
 from ffr_dyn.consistency.tangent import sizes_of
 from ffr_dyn.equations.layout import moved
 from ffr_dyn.integrators import ROS3, Integrator
-from ffr_dyn.linear.turn_map import Returned, Turns, floquet_modes, floquet_shape, period_of, returned, turns
+from ffr_dyn.linear.returning import Returned, returned
+from ffr_dyn.linear.turn_map import Turns, floquet_modes, floquet_shape, period_of, turns, turns_about
 from ffr_dyn.linear.words import in_words
 from ffr_dyn.results.quantities import selected
 from ffr_dyn.results.result import Result
@@ -145,7 +146,7 @@ def floquet_motion(
     """
     assembled = assemble(scene, time=time)
     of, found = _found(assembled, time, method, period)
-    of = turns(of.system, time, found.x, found.v, of.method, of.period)
+    of = turns_about(of, found.x, found.v)
     modes = floquet_modes(of)
     numbers = np.flatnonzero(modes.exponents.imag >= 0)
     if not 0 <= number < numbers.size:
@@ -187,7 +188,7 @@ def _found(
 
 def _multipliers(of: Turns, x: Array, v: Array) -> dict[str, Any]:
     """Floquet's multipliers about a periodic state, the largest first, with their exponents and what moves."""
-    again = turns(of.system, of.near.time, x, v, of.method, of.period)
+    again = turns_about(of, x, v)
     found = floquet_modes(again)
     scene, place = of.system.scene, of.system.layout
     names = in_words(scene, place, x, again.near.M, found.shapes, found.rates, [""] * found.multipliers.size)

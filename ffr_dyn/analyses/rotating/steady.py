@@ -5,7 +5,7 @@ What a steady motion is and how it is found, `ffr_dyn.linear.steady_state` says.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar
@@ -27,6 +27,7 @@ from ffr_dyn.results.quantities import selected
 from ffr_dyn.results.result import Quantity, Result
 from ffr_dyn.scene.described import described
 from ffr_dyn.scene.scene import Scene, require_scene
+from ffr_prep.common.progress import no_count
 
 GROWS = 1e-7  # of a real part relative to the eigenvalue: what is no rounding
 TURN = option("--turn", "What has the speed: a driver, or a joint coordinate such as hinge.angle.", metavar="NAME")
@@ -40,6 +41,7 @@ class Steady(OfMoment):
     >>> result = fd.run(scene, fd.MomentSettings(analysis=fd.Steady(speeds=("0..500",), turn="motor")))
     """
 
+    counts: ClassVar[bool] = True
     example: ClassVar[str] = "ffr-dyn steady blades.toml --turn motor --speed '0..750 rpm:4' -o out/steady.nc"
     speeds: tuple[str, ...] = field(default=(), metadata=SPEEDS)
     turn: str = field(default="", metadata=TURN)
@@ -60,6 +62,7 @@ def steady(
     time: float = 0.0,
     outputs: Sequence[str] = ("default",),
     path: str | Path | None = None,
+    progress: Callable[[int, int], None] = no_count,
 ) -> Result:
     """The steady motion of a scene at `time` [s], a row for every speed [rad/s], with all reactions and the efforts
     of drivers.
@@ -68,6 +71,7 @@ def steady(
     turn    : a driver, or the coordinate of a joint ("hinge.angle") that is to turn evenly; by default the only driver, or
               else the scene's own velocities, scaled until the largest spin is the speed
     outputs : names or patterns of the quantities to keep beside the efforts, as in `forward`
+    progress : called with how many speeds of how many are done
 
     Every body turns about an axis that stays, and keeps its shape: a rotor in bearings, a blade on a hub; not a crank drive.
     What changes with the angle (weight across the axis, for one) is taken as its mean of a turn, which a note tells.
@@ -81,7 +85,10 @@ def steady(
     >>> result = fd.steady(scene, speeds=[100.0, 200.0], turn="motor")
     """
     require_scene(scene)
-    found = list(steady_states(scene, speeds, turn, time))
+    found, values = list[tuple[Assembled, Found]](), speed_list(speeds)
+    for pair in steady_states(scene, values, turn, time):
+        found.append(pair)
+        progress(len(found), max(1, len(values)))
     assembled = found[0][0]
     selected(assembled.system, outputs)
     rows, notes, stable = [], list[str](), True
@@ -102,8 +109,8 @@ def steady(
         "status": "complete",
     }
     plain = result_of(assembled.system, joined(rows), attributes, None, outputs)
-    values = np.array(speed_list(speeds) or [found[0][1].machine.screws.fastest])
-    return with_quantities(plain, {"speed": Quantity(values, "rad/s", (), "of what turns")}, path)
+    turned = np.array(values or [found[0][1].machine.screws.fastest])
+    return with_quantities(plain, {"speed": Quantity(turned, "rad/s", (), "of what turns")}, path)
 
 
 def distinct(notes: Iterable[str]) -> list[str]:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
+import matplotlib as mpl
 import numpy as np
 import pytest
 from click.testing import CliRunner
@@ -49,14 +51,50 @@ def test_critical_speeds_and_whirls_of_a_jeffcott_rotor(tmp_path):
     assert fd.draw_campbell(found, tmp_path / "campbell.svg").stat().st_size > 1000
 
 
+def test_the_picture_of_a_campbell_diagram_tells_what_is_what(tmp_path):
+    """Names of vibrations at the ends of their lines, orders, critical speeds and limits with their numbers."""
+    done = []
+    found = fd.campbell(
+        jeffcott(0.4, 0.2), speeds=(5.0, 26.0, 47.0), modes=3, orders=(1, 2, 7.5), progress=lambda *a: done.append(a)
+    )
+    assert done == [(k, 6) for k in range(1, 7)]
+    assert found.attributes["orders"] == [1.0, 2.0, 7.5]
+    with mpl.rc_context({"svg.fonttype": "none"}):
+        text = fd.draw_campbell(found, tmp_path / "campbell.svg").read_text()
+    said = re.findall(r"<text[^>]*>([^<]*)</text>", text)
+    for name in found.attributes["names"]:
+        assert name in said
+    critical = [f"{one['speed']:.4g}" for one in found.attributes["critical"]]
+    assert {"1x", "2x", "7.5x", "unstable from 30", *critical} <= {one.strip() for one in said}
+    assert len(critical) >= 4
+
+
 def test_damping_inside_is_unstable_above_a_limit():
-    """speed < sqrt(k/m) (1 + c_external / c_internal), nearly, of small damping."""
+    """speed < sqrt(k/m) (1 + c_external / c_internal)."""
     found = fd.campbell(jeffcott(0.4, 0.2), speeds=(5.0, 26.0, 47.0), modes=2)
     (limit,) = found.attributes["limits"]
-    assert limit["speed"] == pytest.approx(np.sqrt(800 / 2) * 1.5, rel=1e-4)
+    assert limit["speed"] == pytest.approx(np.sqrt(800 / 2) * 1.5, rel=1e-8)
     unstable = fd.steady(jeffcott(0.4, 0.2), speeds=(20.0, 40.0))
     assert not unstable.attributes["stable"]
     assert "unstable" in unstable.attributes["notes"][-1]
+    (note,) = [
+        one for one in fd.campbell(jeffcott(0.4, 0.2), speeds=(31.0, 40.0)).attributes["notes"] if "unstable" in one
+    ]
+    assert "at 31 rad/s the steady motion is unstable" in note
+    assert "forward grows by" in note
+
+
+def test_what_only_decays_is_no_slow_vibration():
+    """Tilting that is damped away has no frequency but that of the turning: it hides neither critical speeds nor limits."""
+    scene = jeffcott(0.4, 0.2)
+    shaft, air = scene.forces
+    scene = replace(scene, forces=(replace(shaft, damping=np.diag([0.4, 0.4, 0, 900, 900, 900])), air))
+    found = fd.campbell(scene, speeds=(5.0, 26.0, 47.0), modes=2)
+    assert all(name.startswith("disc shift") for name in found.attributes["names"])
+    assert {name.split(", ")[1] for name in found.attributes["names"]} == {"forward", "backward"}
+    for modes in (1, 2):
+        (limit,) = fd.campbell(scene, speeds=(5.0, 26.0, 47.0), modes=modes).attributes["limits"]
+        assert limit["speed"] == pytest.approx(30.0, rel=1e-8)
 
 
 def test_modes_have_names_and_free_spins_are_no_vibrations():

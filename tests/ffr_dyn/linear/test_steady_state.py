@@ -161,3 +161,57 @@ def test_an_unbalanced_disc_whirls_about_the_axis_of_what_drives_it():
     r = m * e * speed**2 / (k - m * speed**2 + 1j * c * speed)
     assert found["disc.c.position"][-1] == pytest.approx([r.real, r.imag, 0.0], abs=1e-12)
     assert found["motor.effort"][-1] == pytest.approx(c * speed * abs(r) ** 2, rel=1e-6)
+
+
+def unbalanced(damping: float, speed: float) -> fd.Scene:
+    """A disc of 2 kg that spins freely in two bearings of 400 N/m, its mass a millimetre from their line."""
+    points = {"l": (0, 0, -0.2), "r": (0, 0, 0.2), "c": (0, 0, 0)}
+    disc = fd.rigid_body("disc", mass=2.0, inertia=(0.1, 0.1, 0.2), centre_of_mass=(1e-3, 0, 0), points=points)
+    K, C = np.diag([400.0, 400, 4e4, 0, 0, 0]), np.diag([damping / 2, damping / 2, 0, 0, 0, 0])
+    bearings = tuple(fd.Bushing(f"at_{side}", f"ground.{side}", f"disc.{side}", K, C) for side in "lr")
+    return fd.Scene((fd.Body("disc", disc, omega_bar=(0, 0, speed)),), forces=bearings, ground=points)
+
+
+@pytest.mark.parametrize("speed", [10.0, 25.0])
+def test_a_free_rotor_lags_behind_its_unbalance(speed):
+    """(k - m w^2 + i c w) z = m e w^2, with so little damping that it spins for months."""
+    found = fd.steady(unbalanced(0.1, speed))
+    z = 2e-3 * speed**2 / (800 - 2 * speed**2 + 0.1j * speed)
+    at = complex(found["disc.c.position.x"][0], found["disc.c.position.y"][0])
+    assert abs(at - z) < 1e-4 * abs(z.imag)
+
+
+def test_a_free_rotor_that_its_bearings_brake_has_no_steady_motion():
+    """And not because a body is too soft."""
+    with pytest.raises(fd.InputError, match="what acts along disc turn z speeds it up or slows it down; add a driver"):
+        fd.steady(unbalanced(5.0, 25.0))
+
+
+def test_of_two_free_rotors_the_one_that_is_braked_is_told():
+    quiet, braked = unbalanced(0.0, 10.0), unbalanced(5.0, 25.0)
+    other = replace(braked.bodies[0], name="wheel")
+    forces = tuple(
+        fd.Bushing(f"w{b.name}", b.i, b.j.replace("disc", "wheel"), b.stiffness, b.damping) for b in braked.forces
+    )
+    both = replace(quiet, bodies=(*quiet.bodies, other), forces=(*quiet.forces, *forces))
+    with pytest.raises(fd.InputError, match="what acts along wheel turn z"):
+        fd.steady(both)
+
+
+def test_a_torque_that_follows_another_body_holds_what_it_turns():
+    """A coupling by a law that looks at both shafts: what it holds against a brake does not turn on by itself."""
+    points = {"O": (0, 0, 0)}
+    wheel = fd.rigid_body("wheel", mass=1.0, inertia=(0.1, 0.1, 0.1), points=points)
+    bodies = tuple(fd.Body(name, wheel, omega_bar=(0, 0, 5.0)) for name in ("a", "b"))
+    joints = tuple(fd.Joint(f"axis_{name}", "revolute", "ground.O", f"{name}.O") for name in "ab")
+
+    def coupling(t, state):
+        there = state.axes("a").T @ state.axes("b")
+        return -50.0 * np.arctan2(there[1, 0], there[0, 0])
+
+    scene = fd.Scene(
+        bodies, joints, (fd.Driver("motor", "axis_a", fd.polynomial(0.0, 5.0)),), ground=points,
+        forces=(fd.JointSpring("brake", "axis_b", damping=0.2), fd.Actuator("coupling", "axis_b", function=coupling)),
+    )  # fmt: skip
+    found = fd.steady(scene)
+    assert found["axis_a.angle"][0] - found["axis_b.angle"][0] == pytest.approx(0.02, rel=1e-8)

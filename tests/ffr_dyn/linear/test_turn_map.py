@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -9,10 +11,14 @@ from test_analyses_kinematic import bar
 from test_dyn_plane import slider_crank as flexible_crank
 
 import ffr_dyn as fd
+import ffr_prep as fp
 from ffr_dyn.analyses.rotating.periodic import floquet_lines
 from ffr_dyn.functions.time_functions import evaluate
 from ffr_dyn.functions.together import alone
 from ffr_prep.common.errors import InputError
+from ffr_prep.model.material import Material
+from ffr_prep.structures.frame import Member, named, polyline
+from ffr_prep.structures.sections import rectangle
 
 FORCED = 3.0  # rad/s
 
@@ -92,6 +98,19 @@ def test_modes_about_the_turn_of_an_engine_are_those_of_its_rod():
     assert all(name.startswith("rod: ") for name in lasting)
 
 
+@pytest.mark.parametrize(("damping", "turns"), [(0.1, 20), (0.01, 60)])
+def test_deflections_come_back_to_a_hundred_millionth_of_themselves(damping, turns):
+    """Of a turn of a long run: also where vibrations last for many turns, and where they are small beside the scene."""
+    scene = flexible_crank(loads=())
+    bodies = tuple(replace(body, damping=damping) if body.model.n else body for body in scene.bodies)
+    scene = replace(scene, bodies=bodies)
+    found = fd.periodic(scene)
+    period = found.attributes["period"]
+    how = {"output_step": period / 100, "method": fd.ROS3(period / 1000), "check": False}
+    run = fd.forward(scene, end=turns * period, stabilisation=fd.Projection(1e-14), **how)
+    np.testing.assert_allclose(run["rod.q"][-101:], found["rod.q"], rtol=0, atol=1e-8 * np.abs(found["rod.q"]).max())
+
+
 def test_a_driven_machine_ends_where_a_long_run_does():
     scene = flexible_crank(loads=())
     found = fd.periodic(scene)
@@ -157,3 +176,63 @@ def test_the_mode_that_grows_by_a_parametric_resonance_is_told():
     assert [rate for _, rate in exponents] == pytest.approx([w / 2, w / 2])
     assert exponents[0][0] > 0.1
     assert len(lines) == 2
+
+
+@pytest.mark.parametrize("turned", [0.0, np.pi, -np.pi])
+def test_a_spring_is_the_same_whichever_way_its_joint_is_drawn(turned):
+    """Also where deviations from the periodic motion go around half a turn, from where angles are measured anew."""
+    crank = fd.rigid_body("crank", mass=1.0, inertia=(0.1, 0.1, 0.1), points={"o": (0, 0, 0), "h": (0.2, 0, 0)})
+    spin, k = (0, 0, 20.0), 50.0
+    bodies = (
+        fd.Body("crank", crank, omega_bar=spin),
+        fd.Body(
+            "arm", bar("arm", 1.0), position=(0.2, 0, 0), rotation=(0, 0, turned), velocity=(0, 4.0, 0), omega_bar=spin
+        ),
+    )
+    joints = (fd.Joint("axis", "revolute", "ground.O", "crank.o"), fd.Joint("lag", "revolute", "crank.h", "arm.a"))
+    scene = fd.Scene(
+        bodies, joints, (fd.Driver("motor", "axis", fd.polynomial(0.0, 20.0)),), ground={"O": (0, 0, 0)},
+        forces=(fd.JointSpring("spring", "lag", stiffness=k, damping=0.5, free=turned),),
+    )  # fmt: skip
+    found = fd.periodic(scene, floquet=True)
+    mass = bar("arm", 1.0).mass
+    inward = np.cos(turned) * 0.2 * mass * 0.5 * 20.0**2
+    exact = np.roots([mass / 3, 0.5, k + inward])
+    values = np.array([complex(*one) for one in found.attributes["multipliers"]])
+    np.testing.assert_allclose(np.sort(np.abs(values)), np.abs(np.exp(exact * found.attributes["period"])), rtol=1e-6)
+    state = fd.linearise(scene)
+    np.testing.assert_allclose(np.sort(state.eigenvalues.real), exact.real, rtol=1e-6)
+
+
+def four_bar(speed: float) -> fd.Scene:
+    """A crank and rocker with a soft coupler, 0.1, 0.4, 0.3 and 0.4 m long, with weight."""
+    steel, start, a, b, c, g = Material("steel", 2.1e11, 0.3, 7850.0), 0.5, 0.1, 0.4, 0.3, 0.4
+    frame = polyline([(0, 0, 0), (b, 0, 0)], Member(rectangle(0.02, 0.004), steel, (0, 1.0, 0)), elements=24)
+    model = fp.from_frame(named(frame, a=(0, 0, 0), b=(b, 0, 0)), [fp.InterfaceRegion("a"), fp.InterfaceRegion("b")])
+    how = fp.Request(name="coupler", reference=fp.SimplySupported("a", "b"), reduction=fp.CraigBampton(6))
+    coupler = fp.reduce(model, how)
+    A, D = a * np.array([np.cos(start), np.sin(start), 0]), np.array([g, 0, 0])
+    d = np.linalg.norm(D - A)
+    lean = np.arctan2(-A[1], g - A[0]) + np.arccos((b**2 + d**2 - c**2) / (2 * b * d))
+    B = A + b * np.array([np.cos(lean), np.sin(lean), 0])
+    bodies = (
+        fd.Body("crank", bar("crank", a), rotation=(0, 0, start)),
+        fd.Body("coupler", coupler, position=A, rotation=(0, 0, lean), damping=0.02),
+        fd.Body("rocker", bar("rocker", c), position=D, rotation=(0, 0, np.arctan2(B[1], B[0] - g))),
+    )
+    ends = (("ground.O", "crank.a"), ("crank.b", "coupler.a"), ("coupler.b", "rocker.b"), ("ground.D", "rocker.a"))
+    joints = tuple(fd.Joint(f"at_{k}", "revolute", *both) for k, both in enumerate(ends))
+    motor = fd.Driver("motor", "at_0", fd.polynomial(start, speed))
+    return fd.Scene(bodies, joints, (motor,), ground={"O": (0, 0, 0), "D": (g, 0, 0)}, gravity=(0, -9.81, 0))
+
+
+@pytest.mark.parametrize("speed", [20.0, 60.0])
+def test_a_four_bar_whose_vibrations_coarse_steps_do_not_follow(speed):
+    """A turn later it is where it was, and so are three turns of a run that begins there."""
+    scene = four_bar(speed)
+    found = fd.periodic(scene)
+    period, size = found.attributes["period"], np.abs(found["coupler.q"]).max()
+    np.testing.assert_allclose(found["coupler.q"][-1], found["coupler.q"][0], rtol=0, atol=1e-7 * size)
+    how = {"output_step": period / 100, "method": fd.ROS3(period / 1000), "check": False}
+    run = fd.forward(scene, end=3 * period, begin="periodic", stabilisation=fd.Projection(1e-14), **how)
+    np.testing.assert_allclose(run["coupler.q"][-101:], found["coupler.q"], rtol=0, atol=1e-8 * size)

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from test_quasi_static import rotor
 
+import ffr_dyn as fd
 from ffr_dyn.consistency.assemble import assemble, in_space
 from ffr_dyn.consistency.evaluation import total_mass_matrix
-from ffr_dyn.linear.whirl import _integral
+from ffr_dyn.linear.whirl import _integral, damping_ratios, ways_of
 
 
 def test_the_integrals_in_three_directions_are_those_of_the_mass_matrix():
@@ -22,3 +24,56 @@ def test_the_integrals_in_three_directions_are_those_of_the_mass_matrix():
         shift, turn, q = modes[place.R_dot(b)], modes[place.omega(b)], modes[place.q_dot(b)]
         total += sum(_integral(body.model, along, shift, turn, q) for along in np.eye(3))
     np.testing.assert_allclose(total, np.einsum("vm,vw,wm->m", modes.conj(), M, modes).real, rtol=1e-10)
+
+
+def disc_in_bearings(speed: float, across: float = 0.1, along: float = 0.2, damping: float = 0.0) -> fd.Scene:
+    """A rigid rotor of 2 kg that spins about z between two bearings: K = 2 k u, and 2 k a^2 of its tilting."""
+    points = {"l": (0, 0, -0.3), "r": (0, 0, 0.3)}
+    disc = fd.rigid_body("disc", mass=2.0, inertia=(across, across, along), points=points)
+    K, C = np.diag([2e4, 2e4, 1e4, 0, 0, 0]), damping * np.diag([1.0, 1, 0, 0, 0, 0])
+    bearings = tuple(fd.Bushing(f"at_{side}", f"ground.{side}", f"disc.{side}", K, C) for side in "lr")
+    return fd.Scene((fd.Body("disc", disc, omega_bar=(0, 0, speed)),), forces=bearings, ground=points)
+
+
+@pytest.mark.parametrize("along", [0.05, 0.15, 0.2, 0.1999999])
+@pytest.mark.parametrize("damping", [0.0, 3.0])
+def test_whirls_have_the_names_of_their_ways(along, damping):
+    """I_d s^2 + (c - i w I_p) s + k = 0 from the ground: also of the disc without thickness, of which both whirls have one
+    frequency in the turning axes."""
+    speed, k = 50.0, 2 * 2e4 * 0.3**2
+    found = fd.linearise(disc_in_bearings(speed, along=along, damping=damping))
+    tilts = np.roots([0.1, 2 * damping * 0.3**2 - 1j * speed * along, k])
+    shifts = np.roots([2.0, 2 * damping, 4e4])[:1]
+    exact = {"forward": [*tilts[tilts.imag > 0], *shifts], "backward": [*tilts[tilts.imag < 0], *shifts.conj()]}
+    ratios = damping_ratios(found.eigenvalues, 2 * np.pi * found.seen, found.whirl)
+    for way, values in exact.items():
+        here = [i for i, name in enumerate(found.leading) if name.endswith(way)]
+        for value in values:
+            m = min(here, key=lambda i: abs(2 * np.pi * found.seen[i] - value.imag))
+            assert 2 * np.pi * found.seen[m] == pytest.approx(value.imag, rel=1e-7)
+            assert ratios[m] == pytest.approx(-value.real / abs(value), abs=1e-9)
+            assert found.whirl[m] == pytest.approx(1.0)
+    turning = {name.split(",")[0] for name in found.leading if name.endswith(("forward", "backward"))}
+    assert turning <= {"disc shift x", "disc shift y", "disc turn x", "disc turn y"}
+
+
+def test_what_moves_along_the_axis_or_along_a_line_whirls_neither_way():
+    found = fd.linearise(disc_in_bearings(50.0))
+    (along,) = {name for name in found.leading if "shift z" in name}
+    assert along == "disc shift z"
+    assert ways_of(np.array([3.0, -3.0, 3.0, 3.0]), np.array([1.0, 0.9, 0.5, np.nan])) == [
+        "forward",
+        "backward",
+        "",
+        "",
+    ]
+
+
+def test_a_thin_disc_is_followed_by_its_whirls_over_the_speed():
+    """And named by them in a Campbell diagram, whose picture has the names."""
+    speeds = np.linspace(10.0, 60.0, 6)
+    found = fd.campbell(disc_in_bearings(1.0), speeds=speeds, modes=8)
+    tilting = [m for m, name in enumerate(found.attributes["names"]) if "turn" in name]
+    seen = np.sort(2 * np.pi * found["seen"][:, tilting], axis=1)
+    exact = [np.sort(np.roots([0.1, -0.2 * speed, -2 * 2e4 * 0.3**2])) for speed in speeds]
+    np.testing.assert_allclose(seen, exact, rtol=1e-8)

@@ -102,6 +102,15 @@ def changed(old: str, new: str) -> str:
     return SCENE.replace(old, new)
 
 
+def test_what_is_missing_is_said_with_what_to_write(tmp_path):
+    with pytest.raises(
+        InputError, match=r'analysis: is required, and missing; write a table \[analysis\] with kind = "steady"'
+    ):
+        load_scene(written(tmp_path, changed('[analysis]\nend = 0.1\noutput_step = "10 ms"\n', "")))
+    with pytest.raises(InputError, match=r"analysis\.\S*end: is required, and missing$"):
+        load_scene(written(tmp_path, changed("end = 0.1\n", "")))
+
+
 def test_numbers_may_be_formulas_of_parameters_and_have_units(tmp_path):
     scene, settings = load_scene(written(tmp_path))
     bar = scene.bodies[0].model
