@@ -83,7 +83,16 @@ def _columns(run: Result, names: Iterable[str]) -> _Columns:
     known = tuple(names)
     parts = [run[name].reshape(run.time.size, -1) for name in known]
     first = np.cumsum([0, *(part.shape[1] for part in parts)])[:-1]
-    return _Columns(known, first, np.concatenate([np.zeros((run.time.size, 0)), *parts], axis=1))
+    return _Columns(known, first, filled(np.concatenate([np.zeros((run.time.size, 0)), *parts], axis=1)))
+
+
+def filled(table: Array) -> Array:
+    """(T, ...) what is not known (`ffr_dyn.closing.limits`) as in the row before, or in the first that is."""
+    if not np.isnan(table).any():
+        return table
+    rows, known = np.arange(len(table)).reshape(-1, *np.ones(table.ndim - 1, int)), ~np.isnan(table)
+    before = np.maximum.accumulate(np.where(known, rows, -1), axis=0)
+    return np.take_along_axis(table, np.where(before < 0, known.argmax(axis=0), before), axis=0)
 
 
 def step_errors(run: Result, other: Beside | None, order: int, twins: Sequence[Beside] = ()) -> dict[str, StepError]:

@@ -33,6 +33,7 @@ from test_analyses_inverse import flexible_arm
 from test_analyses_kinematic import slider_crank
 from test_analyses_mixed import MOTOR, TIP, bounded, cart_with_rod, mixed, one_link, rest_to_rest
 from test_analyses_static import hanging
+from test_independence import locomotive
 
 import ffr_dyn as fd
 from ffr_dyn.analyses.assemble import assembly
@@ -64,6 +65,7 @@ from ffr_dyn.integrators import (
     ROS2,
     DormandPrince,
     GeneralisedAlpha,
+    HalfExplicit,
     Within,
     method_named,
     stepped,
@@ -319,10 +321,13 @@ def bent(turn: float) -> Scene:
     return Scene((Body("bent", model, q=(q, q)),), ground=GROUND)
 
 
-def at_right_angle(times: tuple[float, float]) -> Result:
-    """A slider-crank with r = l, which is singular at 90 degrees: at 1 s."""
-    scene = slider_crank(0.5, 0.5, Driver("motor", "main", polynomial(1.0, np.pi / 2 - 1.0)), offset=1.0)
-    return kinematic(scene, end=times[0], output_step=times[1])
+def held_in_a_row(angle: float) -> Scene:
+    """Two parallel cranks, held at an angle: in a row where it is zero."""
+    return replace(locomotive(2, angle), drivers=(Driver("hold", "foot0", polynomial(angle)),))
+
+
+# Two parallel cranks, in a row at the start and after every half of a second.
+TURNED = replace(locomotive(2, 0.0, 2 * np.pi), drivers=(Driver("turn", "foot0", polynomial(0.0, 2 * np.pi)),))
 
 
 def jumping() -> Scene:
@@ -414,7 +419,9 @@ RUNS = [
         lambda: kinematic(locking(0.1, 0.5).args[0], end=1.0, output_step=0.05),
         lambda: kinematic(locking(0.1, 0.5).args[0], end=0.1, output_step=0.05),
     ),
-    Case(p(at_right_angle, (2.0, 0.5)), p(at_right_angle, (1.98, 0.22))),
+    Case(*(p(kinematic, held_in_a_row(angle), end=1.0, output_step=0.5) for angle in (0.0, 0.1))),
+    Case(p(run, TURNED, HalfExplicit(1e-3)), p(run, TURNED, RK4(1e-3))),
+    Case(*(p(inverse, TURNED, start=t, end=t + 0.2, output_step=0.1, elastic=QuasiStatic()) for t in (0.0, 0.1))),
     Case(
         lambda: inverse(jumping(), end=0.05, output_step=0.05, elastic=QuasiStatic()),
         lambda: inverse(jumping(), end=0.05, output_step=0.05, elastic=Dynamic(ROS2(1e-4))),
