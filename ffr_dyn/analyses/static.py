@@ -93,8 +93,15 @@ def _lowest_stiffness(at: Evaluator, assembled: Assembled, found: Equilibrium) -
             f"a pole near there, along {motion}; look at the forces and formulas that act on it, or start nearer to an "
             "equilibrium"
         )
-    if not found.found:
+    rigid = assembled.degrees_of_freedom > sum(at.system.layout.n)
+    if not found.found and rigid:
         raise _not_held(assembled, x, Z @ vectors[:, 0], f"no equilibrium was found in {len(found.steps)} steps")
+    if not found.found:
+        motion = named_motion(at.system.scene, at.system.layout, x, Z @ vectors[:, 0])
+        raise ComputationError(
+            f"no equilibrium was found in {len(found.steps)} steps: elastic bodies or springs buckle along {motion}; of loads "
+            f"that grow, {found.borne:.2g} of their size have one; use smaller loads, or run forward with damping"
+        )
     applied = np.linalg.solve(M, found.balance.forces) / sizes(at)
     limit = NEUTRAL * np.abs(applied).max() + ROUNDING * np.abs(values).max()
     loose = int(np.argmin(np.abs(values)))
