@@ -97,7 +97,8 @@ from ffr_dyn.scene.scene import Body, Scene, marker_number
 from ffr_dyn.scene.sensors import Measurement, SectionMeasurement
 from ffr_prep.common.errors import ComputationError, InputError
 from ffr_prep.model.material import Material
-from ffr_prep.structures.frame import Member, named, polyline
+from ffr_prep.structures.frame import Member, polyline
+from ffr_prep.structures.frame import named as named_frame
 from ffr_prep.structures.sections import rectangle
 
 # What is a part of a message, or one made elsewhere.
@@ -334,7 +335,7 @@ def wrung(turn: float) -> Scene:
     """A strip in four parts, on edge, under an end moment that would bend it by so much [rad] if it were lying."""
     ends = {"a": (0.0, 0.0, 0.0), "b": (1.0, 0.0, 0.0)}
     member = Member(rectangle(0.02, 0.002), Material("steel", 2.1e11, 0.3, 7850.0), (0, 1, 0))
-    frame = named(polyline(list(ends.values()), member, elements=8), **ends)
+    frame = named_frame(polyline(list(ends.values()), member, elements=8), **ends)
     model = fp.from_frame(frame, [fp.InterfaceRegion(end) for end in ends])
     body = fp.reduce(model, fp.Request(name="strip", reference=fp.MeanAxis(), reduction=fp.CraigBampton(1), parts=4))
     moment = Load("moment", "strip.b", moment=(0, 2.1e11 * 0.02 * 0.002**3 / 12 * turn, 0))
