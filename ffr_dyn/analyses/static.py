@@ -99,7 +99,7 @@ def _lowest_stiffness(at: Evaluator, assembled: Assembled, found: Equilibrium) -
     if not found.found:
         motion = named_motion(at.system.scene, at.system.layout, x, Z @ vectors[:, 0])
         raise ComputationError(
-            f"no equilibrium was found in {len(found.steps)} steps: elastic bodies or springs buckle along {motion}; of loads "
+            f"no equilibrium was found in {len(found.steps)} steps: bodies or springs buckle along {motion}; of loads "
             f"that grow, {found.borne:.2g} of their size have one; use smaller loads, or run forward with damping"
         )
     applied = np.linalg.solve(M, found.balance.forces) / sizes(at)

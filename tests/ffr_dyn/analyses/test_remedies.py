@@ -438,7 +438,7 @@ RUNS = [
         lambda: kinematic(locking(0.1, 0.5).args[0], end=0.1, output_step=0.05),
     ),
     Case(*(p(kinematic, held_in_a_row(angle), end=1.0, output_step=0.5) for angle in (0.0, 0.1))),
-    Case(lambda: static(wrung(2 * np.pi)), lambda: static(wrung(2.0))),
+    Case(lambda: static(wrung(12.0)), lambda: static(wrung(2.0))),
     Case(p(run, TURNED, HalfExplicit(1e-3)), p(run, TURNED, RK4(1e-3))),
     Case(*(p(inverse, TURNED, start=t, end=t + 0.2, output_step=0.1, elastic=QuasiStatic()) for t in (0.0, 0.1))),
     Case(
