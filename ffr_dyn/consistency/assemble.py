@@ -24,6 +24,7 @@ from ffr_dyn.consistency.sliding import sliding_notes
 from ffr_dyn.consistency.validity import deflections
 from ffr_dyn.equations.constraint_rows import Block, blocks_of
 from ffr_dyn.equations.layout import Layout, initial_state
+from ffr_dyn.scene.force_kinds import forces_of
 from ffr_dyn.scene.scene import Scene, altered, require_scene
 from ffr_dyn.variants.mean_axis import in_mean_axis_frames
 from ffr_dyn.variants.plane import obstacles, planar_forms
@@ -99,7 +100,7 @@ def assemble(scene: Scene, *, time: float = 0.0) -> Assembled:
             f"the scene is planar (normal {scene.plane}): computed in the plane, with in-plane modes without their rounding "
             "across it"
         )
-    notes += sliding_notes(scene)
+    notes += [*sliding_notes(scene), *_idle(scene)]
     doubts = ((body.name, mesh_doubt(body.model.provenance)) for body in scene.bodies)
     notes += [f"body {name!r}: {doubt}" for name, doubt in doubts if doubt]
     notes += held_frequencies(
@@ -109,6 +110,17 @@ def assemble(scene: Scene, *, time: float = 0.0) -> Assembled:
     free = _movable(place) - count
     system = compile_scene(scene, kept) if redundant else rows.engine.system
     return Assembled(system, all_rows, x, v, free, tuple(notes), tuple(redundant), flat.computed)
+
+
+def _idle(scene: Scene) -> list[str]:
+    """A note on every force that acts on the ground alone."""
+    acts = ((force.name, force.place.markers(scene)) for force in forces_of(scene))
+    return [
+        f"{name!r} acts on {' and '.join(places)} alone, and the ground does not move: it does nothing; give it a marker "
+        "of a body"
+        for name, places in acts
+        if places and all(place.startswith("ground.") for place in places)
+    ]
 
 
 def shifted(scene: Scene, place: Layout, guess: Array, x: Array) -> list[str]:
