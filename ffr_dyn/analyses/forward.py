@@ -22,7 +22,7 @@ from ffr_dyn.analyses.rotating.periodic import periodically
 from ffr_dyn.analyses.settings import Settings
 from ffr_dyn.consistency.assemble import Assembled, assemble
 from ffr_dyn.consistency.quasi_static import quasi_static
-from ffr_dyn.consistency.step_error import Beside, StepError, step_errors, too_coarse
+from ffr_dyn.consistency.step_error import Beside, StepError, jumps, step_errors, too_coarse
 from ffr_dyn.consistency.unresolved import Vibrations, lasting, leading, vibrations
 from ffr_dyn.functions.stopwatch import Stopwatch
 from ffr_dyn.functions.together import Say, together
@@ -109,6 +109,12 @@ class _Runs:
     def vibrations(self) -> Vibrations:
         """Of the scene at its start."""
         return vibrations(self.assembled, self.start)
+
+    @cached_property
+    def jumps(self) -> bool:
+        """Whether a force jumps at a time."""
+        system = self.assembled.system
+        return jumps(system.scene, system.model.functions, self.start, self.how["end"])
 
     def run(self, method: Integrator, **more: Any) -> Result:
         """One run."""
@@ -246,7 +252,7 @@ def _checked(
 ) -> _Trial:
     """A run, unless it is there already, with all that tells its errors."""
     trial, more = _with_twin(runs, method, count, kept, result, _further(runs, method, count))
-    return _told(trial, *more)
+    return _told(runs, trial, *more)
 
 
 def _with_twin(
@@ -283,11 +289,11 @@ def _failed(outcome: Any) -> bool:
     return isinstance(outcome, ComputationError) or _granted(outcome) is None
 
 
-def _told(trial: _Trial, other: Any, *longer: Any) -> _Trial:
+def _told(runs: _Runs, trial: _Trial, other: Any, *longer: Any) -> _Trial:
     """The run with its errors, also by what `_further` returned."""
     if _failed(other):
         return replace(trial, errors={})
-    order = PARTLY_STIFF if _share(trial.method) == 0.5 else trial.method.order
+    order = 1 if runs.jumps else PARTLY_STIFF if _share(trial.method) == 0.5 else trial.method.order
     twins = (*trial.twins, *(twin for twin in longer if not _failed(twin)))
     return replace(trial, twins=twins, errors=step_errors(trial.result, other, order, twins))
 
@@ -448,7 +454,7 @@ def _searched(runs: _Runs, within: Within, kept: dict[str, Any], count: int) -> 
             count *= FIRST
             continue
         if not trial.errors or _excess(trial, ringing, trials) <= within.accuracy:
-            trial = _told(trial, *runs.together(_further(runs, method, count, trials), leader=False))
+            trial = _told(runs, trial, *runs.together(_further(runs, method, count, trials), leader=False))
         excess = _excess(trial, ringing, trials) / within.accuracy
         trials.append(trial)
         if excess <= 1.0 or count >= FINEST:

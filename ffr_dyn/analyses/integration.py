@@ -13,6 +13,7 @@ import numpy as np
 from ffr_dyn.analyses.checkpoint import Checkpoint, decode, encode, fingerprint, leaves
 from ffr_dyn.analyses.energy import EnergyWatch
 from ffr_dyn.analyses.events import Event, Watcher
+from ffr_dyn.closing.limits import with_limits
 from ffr_dyn.closing.passed_positions import passed_in_words
 from ffr_dyn.compile.engine import Engine, fill_rows, new_engine, record_row
 from ffr_dyn.compile.scene_tables import System
@@ -28,8 +29,10 @@ from ffr_dyn.functions.stopwatch import Stopwatch
 from ffr_dyn.integrators import Integrator, methods
 from ffr_dyn.integrators.stabilisation import Baumgarte, Projection, Stabilisation, excess_of_gains, gains
 from ffr_dyn.kernels.tables import (
+    AT,
     EVALUATIONS,
     FILLED,
+    LEAST,
     NEXT,
     NOW,
     OK,
@@ -240,7 +243,7 @@ def _started(assembled: Assembled, engine: Engine, energy: EnergyWatch, seen: Se
     status = record_row(engine, start, first, 0)
     if status != OK:
         raise failing.failure(engine.system, engine.work, status, start)
-    first = with_all_reactions(assembled, first)
+    first = with_limits(assembled.system, assembled.all_rows, with_all_reactions(assembled, first))
     kept.add(View(assembled.system, first), np.zeros(1, dtype=np.int64))
     run = _Run(engine, energy, kept, seen, 0)
     if isinstance(kept, Measured):
@@ -292,6 +295,8 @@ def _advance(
             if watcher is not None:
                 kept, ends = watcher.look(kept)
             _look(run, kept)
+            if run.engine.work.independence[LEAST] < AT:
+                kept = with_limits(system, assembled.all_rows, kept)
             part = run.kept.add(View(system, kept), _shown(kept.time.size, looks, ends))
             times = run.kept.times[-1]
             if nonsense := meaningless(system.scene, run.seen.arrays["bodies"]):

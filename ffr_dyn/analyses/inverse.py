@@ -25,7 +25,7 @@ from ffr_dyn.consistency.mobility import require_driven
 from ffr_dyn.equations.layout import moved, to_global_axes
 from ffr_dyn.integrators import Integrator, Within
 from ffr_dyn.integrators.stabilisation import Projection, Stabilisation
-from ffr_dyn.kernels.tables import EVALUATIONS
+from ffr_dyn.kernels.tables import AT, EVALUATIONS, HERE
 from ffr_dyn.results.quantities import selected
 from ffr_dyn.results.result import Result
 from ffr_dyn.scene.described import described
@@ -133,6 +133,7 @@ def _quasi_static(
     tangent = None
     for row, time in enumerate(rigid.time):
         x = _undeformed_state(assembled, rigid, row)
+        _require_regular(at, float(time), x)
         q, tangent = _deformed(at, places, float(time), x, q, tangent)
         _pose(at, places, float(time), x, q)
         rows.append(copied(at.record))
@@ -170,6 +171,15 @@ def _undeformed_state(assembled: Assembled, rigid: Result, row: int) -> Array:
     for b, body in enumerate(assembled.system.scene.bodies):
         x[place.R(b)], x[place.p(b)] = rigid[f"{body.name}.R"][row], rigid[f"{body.name}.p"][row]
     return x
+
+
+def _require_regular(at: Evaluator, time: float, x: Array) -> None:
+    """ComputationError in a singular position."""
+    if evaluate(at, time, x, np.zeros(at.system.layout.v_size)).singular or at.work.independence[HERE] < AT:
+        raise ComputationError(
+            f"at t = {time:.6g} s the position is singular: joints and drivers determine neither the motion nor the "
+            "deformation there; choose output times that miss it, or use elastic=Dynamic()"
+        )
 
 
 def _pose(at: Evaluator, places: tuple[Array, Array], time: float, x: Array, q: Array) -> Array:

@@ -19,6 +19,7 @@ from ffr_dyn.analyses.integration import with_all_reactions
 from ffr_dyn.analyses.outcome import output_times, result_of
 from ffr_dyn.analyses.registry import OverTime
 from ffr_dyn.analyses.settings import Settings
+from ffr_dyn.closing.limits import with_limits
 from ffr_dyn.consistency import doubts
 from ffr_dyn.consistency.assemble import Assembled, assemble
 from ffr_dyn.consistency.evaluation import Evaluation, Evaluator, copied, evaluate, evaluator, joined, total_mass_matrix
@@ -39,6 +40,7 @@ LARGEST_TURN = 0.2  # rad, of a body in a part of a step
 SMALLEST_PART = 1e-8  # of an output step
 NEAR = 1e-2  # conditioning, relative to the best met, below which a position is reported as nearly singular
 SINGULAR = 1e-4  # the same, where Phi within the tolerance no longer determines the motion
+AT_REST = 1e-5  # the same, absolute, of a position that drivers hold
 
 
 @dataclass(frozen=True)
@@ -80,7 +82,8 @@ def kinematic(
 
     Raises InputError when a rigid motion is left free or prescribed twice, ComputationError when the mechanism locks: the
     message gives the time and the joint at its dead point. Positions that are nearly or exactly singular on the way, where
-    the motion could branch, are told in the notes.
+    the motion could branch, are told in the notes; rows there are limits from both sides, and reactions that grow without
+    bound are nan.
 
     >>> result = fd.kinematic(scene, end=0.2, output_step=1e-3)
     """
@@ -157,7 +160,7 @@ def _advanced(at: Evaluator, pose: _Pose, time: float) -> _Pose | None:
     for _ in range(ITERATIONS):
         now = evaluate(at, time, x, np.zeros(place.v_size))
         if np.abs(now.Phi).max(initial=0.0) < TOLERANCE:
-            return _pose(at, time, x, np.zeros(place.v_size))
+            return _pose(at, time, x, pose.v)
         step = np.linalg.lstsq(now.jacobian, -now.Phi, rcond=1e-12)[0]
         if _turn(at, step) > LARGEST_TURN:
             return None
@@ -171,10 +174,10 @@ def _turn(at: Evaluator, step: Array) -> float:
 
 
 def _pose(at: Evaluator, time: float, x: Array, v: Array) -> _Pose:
-    """The pose with its velocities (body axes): the rate of the rows at rest is Phi_t."""
+    """The pose with its velocities (body axes), nearest to v, those before it: the rate of the rows at rest is Phi_t."""
     still = evaluate(at, time, x, np.zeros_like(v))
     values, sign, motion = _conditioning(at, still, x)
-    v = np.linalg.lstsq(still.jacobian, -still.nu, rcond=1e-12)[0]
+    v = v + np.linalg.lstsq(still.jacobian, -still.nu - still.jacobian @ v, rcond=SINGULAR)[0]
     return _Pose(time, x, v, values, sign, named_motion(at.system.scene, at.system.layout, x, motion))
 
 
@@ -199,19 +202,26 @@ def _locked(at: Evaluator, pose: _Pose) -> ComputationError:
 
 
 def _recorded(assembled: Assembled, poses: list[_Pose]) -> Record:
-    """Rows of the result. Raises ComputationError where a pose is singular, since accelerations are not determined there."""
+    """Rows of the result, limits where a pose is singular. Raises ComputationError where there are none."""
     at, best = evaluator(assembled.system), max(pose.conditioning for pose in poses)
     rows = []
     for pose in poses:
-        v = to_global_axes(assembled.system.layout, pose.x, pose.v)
-        now = evaluate(at, pose.time, pose.x, v)
-        if now.singular or pose.conditioning < SINGULAR * best:
-            raise ComputationError(
-                f"at t = {pose.time:.6g} s the position is singular: the drivers do not determine the motion of "
-                f"{pose.joint}; choose output times that miss it, or drive another joint"
-            )
+        if evaluate(at, pose.time, pose.x, to_global_axes(assembled.system.layout, pose.x, pose.v)).singular:
+            raise _undetermined(pose)
         rows.append(copied(at.record))
-    return with_all_reactions(assembled, joined(rows))
+    record = with_limits(assembled.system, assembled.all_rows, with_all_reactions(assembled, joined(rows)))
+    for row, pose in enumerate(poses):
+        lost = pose.conditioning < SINGULAR * best and not np.isfinite(record.vd[row]).all()
+        if lost or (pose.conditioning < AT_REST and not record.v[row].any()):  # which is on no path
+            raise _undetermined(pose)
+    return record
+
+
+def _undetermined(pose: _Pose) -> ComputationError:
+    return ComputationError(
+        f"at t = {pose.time:.6g} s the position is singular: the drivers do not determine the motion of {pose.joint}; choose "
+        "output times that miss it, or drive another joint"
+    )
 
 
 def _singular_notes(poses: list[_Pose]) -> list[str]:

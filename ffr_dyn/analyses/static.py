@@ -41,6 +41,8 @@ from ffr_prep.common.errors import ComputationError, InputError
 
 NEUTRAL = 1e-7  # of a stiffness, relative to that of the applied forces
 ROUNDING = 1e-13  # of a stiffness, relative to the largest
+SYMMETRIC = 1e-12  # of what a stiffness matrix is off symmetry, relative to its largest entry
+MET = 1e-6  # of the imaginary part of an eigenvalue, beyond which two have met
 
 
 @dataclass(frozen=True)
@@ -72,18 +74,21 @@ def static(
     selected(assembled.system, outputs)
     at = evaluator(assembled.system)
     found = equilibrium(assembled.system, time, assembled.x, sizes(at))
-    lowest = _lowest_stiffness(at, assembled, found)
+    lowest, flutter = _lowest_stiffness(at, assembled, found)
     branch = jumped(assembled.system, time, assembled.x, sizes(at), found)
-    return _result(scene, assembled, at, found, time, (lowest, branch), outputs, path)
+    return _result(scene, assembled, at, found, time, (lowest, flutter, branch), outputs, path)
 
 
-def _lowest_stiffness(at: Evaluator, assembled: Assembled, found: Equilibrium) -> float:
-    """[1/s^2] per mass, of the free motions; infinite where there is none. InputError for a motion that nothing holds."""
+def _lowest_stiffness(at: Evaluator, assembled: Assembled, found: Equilibrium) -> tuple[float, float]:
+    """[1/s^2] per mass, of the free motions; infinite where there is none; and the frequency [Hz] of flutter, or zero.
+
+    InputError for a motion that nothing holds.
+    """
     x = found.path[-1]
     M = total_mass_matrix(at.system.scene, at.system.layout, x if found.found else found.path[0])
     Z = free_motions(found.balance.jacobian, M)
     if not Z.shape[1]:
-        return float("inf")
+        return float("inf"), 0.0
     K = Z.T @ found.balance.stiffness @ Z
     values, vectors = np.linalg.eigh(0.5 * (K + K.T))
     if not found.found and values[0] > 0:
@@ -93,14 +98,36 @@ def _lowest_stiffness(at: Evaluator, assembled: Assembled, found: Equilibrium) -
             f"a pole near there, along {motion}; look at the forces and formulas that act on it, or start nearer to an "
             "equilibrium"
         )
-    if not found.found:
+    rigid = assembled.degrees_of_freedom > sum(at.system.layout.n)
+    if not found.found and rigid:
         raise _not_held(assembled, x, Z @ vectors[:, 0], f"no equilibrium was found in {len(found.steps)} steps")
+    if not found.found:
+        motion = named_motion(at.system.scene, at.system.layout, x, Z @ vectors[:, 0])
+        raise ComputationError(
+            f"no equilibrium was found in {len(found.steps)} steps: bodies or springs buckle along {motion}; of loads "
+            f"that grow, {found.borne:.2g} of their size have one; use smaller loads, or run forward with damping"
+        )
     applied = np.linalg.solve(M, found.balance.forces) / sizes(at)
     limit = NEUTRAL * np.abs(applied).max() + ROUNDING * np.abs(values).max()
     loose = int(np.argmin(np.abs(values)))
     if abs(values[loose]) <= limit:
         raise _not_held(assembled, x, Z @ vectors[:, loose], "the equilibrium is not determined")
-    return float(values[0])
+    return _eigenvalues(K, float(values[0]))
+
+
+def _eigenvalues(K: Array, lowest: float) -> tuple[float, float]:
+    """The lowest eigenvalue, and the frequency [Hz] at which it flutters, or zero; `lowest` is that of the symmetric part.
+
+    Forces without a potential leave K unsymmetric, and its symmetric part says nothing of stability then; where two
+    eigenvalues have met and are complex, a vibration grows.
+    """
+    largest = np.abs(K).max()
+    if np.abs(K - K.T).max() <= SYMMETRIC * largest:
+        return lowest, 0.0
+    values = np.linalg.eigvals(K)
+    met = values[np.abs(values.imag) > MET * np.abs(values) + SYMMETRIC * largest].astype(complex)
+    frequencies = np.abs(np.sqrt(-met).imag) / (2 * np.pi)
+    return float(values.real.min()), float(frequencies.min()) if met.size else 0.0
 
 
 def _not_held(assembled: Assembled, x: Array, direction: Array, what: str) -> InputError:
@@ -118,7 +145,7 @@ def _result(
     at: Evaluator,
     found: Equilibrium,
     time: float,
-    seen: tuple[float, str],
+    seen: tuple[float, float, str],
     outputs: Sequence[str],
     path: str | Path | None,
 ) -> Result:
@@ -126,10 +153,12 @@ def _result(
     for x in found.path[:-1]:  # forces count the turns of angles on the way
         evaluate(at, time, x, still)
     record = with_all_reactions(assembled, record_states(at, np.array([time]), found.path[-1:], still[None]))
-    lowest, branch = seen
-    stable = lowest > 0
+    lowest, flutter, branch = seen
+    stable = lowest > 0 and not flutter
     notes = [*assembled.notes, *checked("static", assembled, record), *([branch] if branch else [])]
-    if not stable:
+    if flutter:
+        notes.append(f"the equilibrium is unstable: without damping it flutters, at {flutter:.4g} Hz")
+    elif not stable:
         notes.append(f"the equilibrium is unstable: its lowest stiffness per mass is {lowest:.4g} 1/s^2")
     attributes = {
         **described(scene),

@@ -26,7 +26,7 @@ from ffr_dyn.kernels.tables import (
     N,
 )
 from ffr_dyn.scene.scene import Body, Scene
-from ffr_dyn.variants.families import ROUNDING, SECOND_ORDER_ROUNDING
+from ffr_dyn.variants.families import ROUNDING, rounding_of
 from ffr_prep.body import axial, remembered
 from ffr_prep.common.arrays import Array
 
@@ -134,8 +134,11 @@ def _made(body: Body, kept: Integrals, normal: int) -> _Tables:
 def _second_moments(body: Body, kept: Integrals, normal: int) -> tuple[Array, Array]:
     """I5, I9 and X: a unit mode has a second moment of one, so the size of their rounding is known."""
     table = _PP_parts(kept, normal)
-    noise = ROUNDING + SECOND_ORDER_ROUNDING * np.abs(second_moments(body)).max(initial=0.0)
-    return in_blocks(table, table.shape[1] // 3, np.full(table.shape[1], noise)) if table.any() else NO_BLOCKS
+    if not table.any():
+        return NO_BLOCKS
+    X = second_moments(body).reshape(9, *kept.I5.shape[1:])
+    noise = ROUNDING + rounding_of(X, kept.omega2).max(axis=0)
+    return in_blocks(table, table.shape[1] // 3, noise[:, None])
 
 
 def body_tables(scene: Scene, place: Layout) -> Bodies:

@@ -59,7 +59,8 @@ def _bending(body: Body, point: str, rows: tuple[int, ...]) -> tuple[Array, Arra
 
     def make() -> tuple[Array, Array]:
         K, kept, at = marker_matrices(body, point), list(rows), body.model.interface(point)
-        pool, plan = in_blocks(-np.moveaxis(K[kept], 1, 0), len(kept), rounding_of(K)[kept])
+        noise = rounding_of(K, body.model.omega2)[kept]
+        pool, plan = in_blocks(-np.moveaxis(K[kept], 1, 0), len(kept), np.moveaxis(noise, 1, 0))
         straight = np.concatenate([at.phi_t, at.phi_r])[kept].ravel()
         return np.concatenate([np.pad(straight, (0, -straight.size % LANES)), pool]), plan
 

@@ -22,12 +22,13 @@ BLOCK, BROUGHT, ALONE = 96, 16, 6
 FEW = 8  # coordinates, which are not worth the search
 
 
-def in_blocks(table: Array, last: int, noise: Array) -> tuple[Array, Array]:
+def in_blocks(table: Array, last: int, noise: Array | float) -> tuple[Array, Array]:
     """(pool, plan) of a table (n, C, n) over i, components, j: sum_i q_i table[i], as the kernel `contract` reads it.
 
     table : table[i, c, j] = +-table[j, c, i]
     last  : so many of the last components are multiplied by q_dot, too
-    noise : (C,) entries that are not larger couple nothing; they are left out between families that nothing else couples
+    noise : number or (n, C, n); entries that are not larger couple nothing, they are left out between families that nothing
+            else couples
 
     The plan, of integers, begins with the numbers that `ffr_dyn.kernels.tables.BLOCKS` and what follows it name. Of each
     block its first coordinate and how many, its first sum and how many, in whole rows of lanes in the pool. Where coordinates
@@ -40,7 +41,7 @@ def in_blocks(table: Array, last: int, noise: Array) -> tuple[Array, Array]:
     every, products = np.arange(n), np.arange(C * n)
     whole = [(every, products[:early]), (every, products[early:])]
     if n > FEW:
-        coupled = np.abs(table) > noise[:, None]
+        coupled = np.abs(table) > noise
         parts, order = _by_family(coupled, early)
         plan, cost = _sorted_plan(parts, order, early, C * n)
         if cost < _cost(whole):

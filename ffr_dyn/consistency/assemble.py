@@ -24,6 +24,7 @@ from ffr_dyn.consistency.sliding import sliding_notes
 from ffr_dyn.consistency.validity import deflections
 from ffr_dyn.equations.constraint_rows import Block, blocks_of
 from ffr_dyn.equations.layout import Layout, initial_state
+from ffr_dyn.scene.force_kinds import forces_of
 from ffr_dyn.scene.scene import Scene, altered, require_scene
 from ffr_dyn.scene.sensors import StressMeasurement
 from ffr_dyn.variants.mean_axis import in_mean_axis_frames
@@ -101,8 +102,7 @@ def assemble(scene: Scene, *, time: float = 0.0) -> Assembled:
             f"the scene is planar (normal {scene.plane}): computed in the plane, with in-plane modes without their rounding "
             "across it"
         )
-    notes += sliding_notes(scene)
-    notes += body_doubts(scene)
+    notes += [*sliding_notes(scene), *_idle(scene), *body_doubts(scene)]
     notes += held_frequencies(
         declared, [(x[place.R(b)], x[place.p(b)]) for b in range(len(place.n))], scene.plane, time
     )
@@ -124,6 +124,17 @@ def body_doubts(scene: Scene) -> list[str]:
 def _gravity_doubts(scene: Scene) -> list[str]:
     size = float(np.linalg.norm(scene.gravity))
     return [f"gravity is {size:.4g} m/s^2: is it in mm/s^2?"] if size > _MOST_GRAVITY else []
+
+
+def _idle(scene: Scene) -> list[str]:
+    """A note on every force that acts on the ground alone."""
+    acts = ((force.name, force.place.markers(scene)) for force in forces_of(scene))
+    return [
+        f"{name!r} acts on {' and '.join(places)} alone, and the ground does not move: it does nothing; give it a marker "
+        "of a body"
+        for name, places in acts
+        if places and all(place.startswith("ground.") for place in places)
+    ]
 
 
 def shifted(scene: Scene, place: Layout, guess: Array, x: Array) -> list[str]:

@@ -53,6 +53,7 @@ class Equilibrium:
 
     found      : whether the last step was Newton's, and below the tolerance
     load_steps : parts in which weight and loads were applied
+    borne      : the share of them for which an equilibrium was found by load steps, where not all are
     """
 
     path: Array
@@ -61,6 +62,7 @@ class Equilibrium:
     steps: tuple[float, ...]
     found: bool
     load_steps: int = 1
+    borne: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -104,7 +106,9 @@ def _by_load_steps(problem: _Problem, start: Equilibrium, failed: Equilibrium) -
             continue
         share, size, now, count = goal, 2 * size, there, count + 1
         path.append(there.path)
-    return Equilibrium(np.concatenate(path), now.lam, now.balance, tuple(steps), True, count) if share == 1 else failed
+    if share < 1:
+        return replace(failed, borne=share)
+    return Equilibrium(np.concatenate(path), now.lam, now.balance, tuple(steps), True, count)
 
 
 def _newton(problem: _Problem, start: Equilibrium, share: float, iterations: int) -> Equilibrium:

@@ -10,7 +10,7 @@ from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.consistency.dropped_terms import remedy
 from ffr_dyn.consistency.following import row_named
 from ffr_dyn.equations.constraint_rows import drive_of
-from ffr_dyn.integrators import ROS2, Integrator
+from ffr_dyn.integrators import RK4, ROS2, ROS3, Integrator
 from ffr_dyn.kernels.tables import (
     FAILED,
     IN_DAMPING,
@@ -32,6 +32,7 @@ from ffr_prep.common.errors import ComputationError
 
 NEAR = 1e-2  # independence of constraints, 1 where they are at right angles: what is left of it near a dead point
 FAST = 1e5  # N/kg: a load beside the mass of the scene that moves it out of sight in a step
+FEW = 2.0  # steps
 HUGE = 1e12  # N, N m: no force of a machine; what made the state overflow
 
 
@@ -76,7 +77,7 @@ def failure(system: System, work: Work, status: int, time: float, settings: Sett
         )
     if status == NOT_CONVERGED:
         return ComputationError(
-            f"{at} the iterations of the step do not converge, {_unconverged(system, work, where, settings)}"
+            f"{at} the iterations of the step do not converge: {_unconverged(system, work, where, time, settings)}"
         )
     assert status == STEP_TOO_SMALL
     return ComputationError(
@@ -195,24 +196,40 @@ def _timed(count: int, row: Array, system: System, work: Work) -> Array:
     return timed
 
 
-def _unconverged(system: System, work: Work, where: int, settings: Settings) -> str:
+def _unconverged(system: System, work: Work, where: int, time: float, settings: Settings) -> str:
     """Of a body, or after the bodies a constraint row: where, the likely cause and what to change."""
     bodies, other = system.scene.bodies, not isinstance(settings.method, ROS2)
+    if where < len(bodies):
+        name = bodies[where].name
+    else:
+        at = int(np.searchsorted(system.model.rows.start, where - len(bodies), side="right")) - 1
+        name = system.blocks[at].name
+    if _stuck(work, time, settings.method):
+        return (
+            f"worst in {name!r}: constraints depend on one another: the mechanism locks{_dead_point(system)} or is in "
+            f"a singular position, which this method does not pass; {_remedy(system, 'use RK4, ROS2 or ROS3')}"
+        )
     if where < len(bodies) and system.model.bodies.where[where, IN_DAMPING] >= 0:
         return (
-            f"worst in body {bodies[where].name!r}: the step is too large for its damping matrix, which couples its "
-            "coordinates; use ROS2 or ROS3, or a smaller step"
+            f"worst in body {name!r}: the step is too large for its damping matrix, which couples its coordinates; use ROS2 "
+            "or ROS3, or a smaller step"
         )
     if where < len(bodies):
         return (
-            f"worst in body {bodies[where].name!r}: the step is too large for its rotation or for a spring, damper, stop or "
-            f"friction that acts on it; use a smaller step{', ROS2' if other else ''}, or a softer force"
-            f"{_beyond(system, work)}"
+            f"worst in body {name!r}: the step is too large for its rotation or for a spring, damper, stop or friction that "
+            f"acts on it; use a smaller step{', ROS2' if other else ''}, or a softer force{_beyond(system, work)}"
         )
-    block = system.blocks[int(np.searchsorted(system.model.rows.start, where - len(bodies), side="right")) - 1]
     change = f"use a smaller step{', or ROS2 to pass a singular position' if other else ''}"
     return (
-        f"worst in {block.name!r}: its constraint cannot be met, because the mechanism locks there{_dead_point(system)} or "
+        f"worst in {name!r}: its constraint cannot be met, because the mechanism locks there{_dead_point(system)} or "
         "is singular, or because the step is too large or a stiff spring far from its free length; "
         f"{_remedy(system, change)}{_beyond(system, work)}"
     )
+
+
+def _stuck(work: Work, time: float, method: Integrator | None) -> bool:
+    """Whether constraints have just come to depend on one another, under a method that does not pass such positions."""
+    least, when = work.independence[[LEAST, WHEN]]
+    if method is None or isinstance(method, (RK4, ROS2, ROS3)):
+        return False
+    return bool(least < NEAR**2 and abs(time - when) <= FEW * method.step)

@@ -6,6 +6,7 @@ the twin (`ffr_dyn.integrators.ros2.Twin`), which keeps its amplitude: with R of
     s = max |R(h) - R(r h)| / (r^p - 1),    v = 1.5 max |R(h) - T(h)|,    error = max(s, v),
 
 over all rows and components of an output. The factor is for vibration that is resolved in part, where the twin errs, too.
+Where a force jumps at a time, or a servo is asked for a rate that does, methods are of first order, and p is 1.
 Steps up to twice as long that change an output by more than a tenth of its range, as where they jump over an impact, have no
 order yet: p is 1 then.
 
@@ -31,7 +32,12 @@ from functools import cache
 
 import numpy as np
 
+from ffr_dyn.functions.operations import ABS, MAX, MIN, SIGN, STEP
+from ffr_dyn.functions.time_functions import OPERATION, PIECEWISE
+from ffr_dyn.kernels.tables import Functions
 from ffr_dyn.results.result import Result
+from ffr_dyn.scene.forces import Servo
+from ffr_dyn.scene.scene import Scene
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.units import natural
 
@@ -46,6 +52,7 @@ NOISE = (70 / 36) ** 0.5  # by which rows without relation are farther off the c
 RATES = {"position": "velocity", "R": "v", "q": "q_dot"}
 CONSTANT = 1e-7  # of the size of a kind: a range below it is rounding, as of the rate of an even turn
 ROUNDING = 1e-10  # of what a scene's mass, length and speed make of a unit
+JUMP = 1e-6  # of the coefficients of a function, beyond which it jumps
 AT_ONCE = 2e7  # bytes of numbers that are compared side by side
 COARSE = 0.01  # of the range, by which a row may be off the curve through its neighbours
 
@@ -84,7 +91,45 @@ def _columns(run: Result, names: Iterable[str]) -> _Columns:
     known = tuple(names)
     parts = [run[name].reshape(run.time.size, -1) for name in known]
     first = np.cumsum([0, *(part.shape[1] for part in parts)])[:-1]
-    return _Columns(known, first, np.concatenate([np.zeros((run.time.size, 0)), *parts], axis=1))
+    return _Columns(known, first, filled(np.concatenate([np.zeros((run.time.size, 0)), *parts], axis=1)))
+
+
+def filled(table: Array) -> Array:
+    """(T, ...) what is not known (`ffr_dyn.closing.limits`) as in the row before, or in the first that is."""
+    if not np.isnan(table).any():
+        return table
+    rows, known = np.arange(len(table)).reshape(-1, *np.ones(table.ndim - 1, int)), ~np.isnan(table)
+    before = np.maximum.accumulate(np.where(known, rows, -1), axis=0)
+    return np.take_along_axis(table, np.where(before < 0, known.argmax(axis=0), before), axis=0)
+
+
+def jumps(scene: Scene, functions: Functions, start: float, end: float) -> bool:
+    """Whether a function of time jumps between two times [s], or its rate does where a servo asks for rates."""
+    rates = any(isinstance(force, Servo) and force.kd > 0 for force in scene.forces)
+    sudden = {SIGN, STEP, *((ABS, MIN, MAX) if rates else ())}
+    for kind, first in zip(functions.kind.tolist(), functions.start.tolist(), strict=False):
+        data = functions.data[first:]
+        if kind == OPERATION and int(data[0]) in sudden:
+            return True
+        if kind == PIECEWISE and _breaks(data, start, end, rates):
+            return True
+    return False
+
+
+def _breaks(data: Array, start: float, end: float, rates: bool) -> bool:
+    """Whether a piecewise polynomial in the tables (`ffr_dyn.kernels.functions.piecewise`) jumps, or its rate."""
+    pieces, count = int(data[0]), int(data[1])
+    breaks = data[2 : 3 + pieces]
+    coefficients = data[3 + pieces :][: pieces * count].reshape(pieces, count)
+    for k in np.flatnonzero((breaks[1:-1] > start) & (breaks[1:-1] < end)).tolist():
+        before, width = np.polynomial.Polynomial(coefficients[k]), breaks[k + 1] - breaks[k]
+        after = np.polynomial.Polynomial(coefficients[k + 1])
+        size = np.abs(coefficients).max()
+        if abs(before(width) - after(0.0)) > JUMP * size:
+            return True
+        if rates and abs(before.deriv()(width) - after.deriv()(0.0)) > JUMP * size:
+            return True
+    return False
 
 
 def step_errors(run: Result, other: Beside | None, order: float, twins: Sequence[Beside] = ()) -> dict[str, StepError]:

@@ -89,14 +89,17 @@ def drive_of(word: Word, time: float) -> tuple[float, float, float]:
         return evaluate(word.function, time)
     except (ValueError, ZeroDivisionError, OverflowError) as error:
         raise InputError(
-            f"the function of time in the row '{word.text}' has no value at t = {time:.6g} s ({error}); let the run start "
-            "where it has one, or write it another way"
+            f"the function of time has no value at t = {time:.6g} s ({error}); let the run start where it has one, or "
+            "write it another way"
         ) from None
 
 
 def drive_at(block: Block, word: Word, time: float) -> tuple[float, float, float]:
-    """As `drive_of`, of a word of a block. Raises InputError also for a distance that is not positive."""
-    drive = drive_of(word, time)
+    """As `drive_of`, of a word of a block by name. Raises InputError also for a distance that is not positive."""
+    try:
+        drive = drive_of(word, time)
+    except InputError as error:
+        raise InputError(f"{'driver' if block.driver else 'joint'} {block.name!r}: {error}") from None
     if word.kind == DISTANCE and not drive[0] > 0:
         raise InputError(f"joint {block.name!r}: length is {drive[0]:.4g} m at t = {time:.6g} s; it must be positive")
     return drive

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ffr_dyn.functions.operations import ADD, DIVIDE, EXP, FUNCTIONS, LOG, MAX, MULTIPLY, POWER, SUBTRACT, value
-from ffr_dyn.functions.quantities import Marked, check_dimension, marked
+from ffr_dyn.functions.quantities import Marked, check_dimension, known_quantities, marked
 from ffr_dyn.functions.time_functions import (
     OPERATION,
     POLYNOMIAL,
@@ -99,7 +99,7 @@ def parse(text: str, parameters: Mapping[str, Any], what: str, unit: str | None 
         plain = marked(text.strip())
         names = ChainMap(dict(plain.quantities), parameters)  # type: ignore[arg-type]
         tree = ast.parse(plain.text, mode="eval").body
-        check_dimension(tree, plain.quantities, unit)
+        check_dimension(tree, known_quantities(tree, plain.quantities, parameters), unit)
     except InputError as error:
         raise InputError(f"{what}: in the formula {text!r}: {error}") from None
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:

@@ -1,8 +1,10 @@
 """Numbers with units within formulas, "0.2 m + 100 mm/s * t": how they are found in the text, and what unit comes of them.
 
 What can be known is known: a number with a unit, and t, in seconds. Other numbers, and values of functions, are pure where
-they multiply, and take the unit of what they are added to. Of parameters, which are numbers in SI units here, of inputs and
-of measured quantities nothing is known, nor of what they multiply. A formula without any unit is not looked at.
+they multiply, and take the unit of what they are added to. A parameter that is a number with a unit is known, too, where no
+number without one stands beside it: "-g", but not "3 * g", whose 3 may be of any unit. Of other parameters, which are
+numbers in SI units here, of inputs and of measured quantities nothing is known, nor of what they multiply. A formula without
+any unit is not looked at.
 """
 
 from __future__ import annotations
@@ -79,6 +81,19 @@ def _end_of_unit(text: str, start: int) -> int:
     while (following := _NEXT.match(text, end)) and (following[1] == "/" or is_unit(following[2])):
         end = following.end()
     return end
+
+
+def known_quantities(
+    tree: ast.expr, quantities: Mapping[str, WithUnit], parameters: Mapping[str, object]
+) -> Mapping[str, WithUnit]:
+    """What has a unit in a formula: its numbers, and parameters unless numbers without one stand beside them."""
+    if any(isinstance(node, ast.Constant) for node in ast.walk(tree)):
+        return quantities
+    names = {ast.unparse(node) for node in ast.walk(tree) if isinstance(node, (ast.Name, ast.Attribute))} & set(
+        parameters
+    )
+    given = {name: parameters[name] for name in sorted(names - set(quantities))}
+    return {**quantities, **{name: value for name, value in given.items() if isinstance(value, WithUnit)}}
 
 
 # ---- what unit comes of them ----------------------------------------------------------------------------------------

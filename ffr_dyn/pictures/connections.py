@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -185,7 +185,8 @@ def _arrows(result: Result, name: str, of: Mapping[str, Any], markers: Mapping[s
     found += [arrow for one in of.get("efforts", ()) for arrow in _effort(result, name, one, markers)]
     if f"{name}.tension" in result.quantities and of["at"][0] in markers and len(of["at"]) == 2:
         found.append(_pull(name, result[f"{name}.tension"], markers[of["at"][0]], at))
-    return [arrow for arrow in found if np.isfinite(arrow.vector).all()]
+    known = [(arrow, np.isfinite(arrow.vector).all(axis=-1)) for arrow in found]
+    return [replace(arrow, vector=np.where(rows[..., None], arrow.vector, 0.0)) for arrow, rows in known if rows.any()]
 
 
 def _effort(result: Result, name: str, of: Mapping[str, Any], markers: Mapping[str, Array]) -> Iterator[ArrowShown]:

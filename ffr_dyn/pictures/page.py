@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from matplotlib import colormaps
 
+from ffr_dyn.consistency.step_error import filled
 from ffr_dyn.pictures.connections import ArrowShown, Connections, SpreadShown
 from ffr_dyn.pictures.film import BODY_COLOURS, TRACE_COLOURS, Camera, Film, Link, Solid
 from ffr_dyn.pictures.morphs import MOST_SHAPES, MOST_TENSORS, beside, is_closed, morph, quadratic, sharp_edges
@@ -216,7 +217,7 @@ def _series(shown: Shown, numbers: _Numbers) -> list[Item]:
         room -= quantity.values.size
         if not wanted & set(own) and (name.endswith(_NOT_PLOTTED) or room < 0):
             continue
-        values, unit = numbers.keep(quantity.values, "h2"), pretty(quantity.unit) or "1"
+        values, unit = numbers.keep(filled(quantity.values), "h2"), pretty(quantity.unit) or "1"
         found += [
             {"name": one, "unit": unit, "values": values, "of": len(own), "column": k, "chosen": one in wanted}
             for k, one in enumerate(own)

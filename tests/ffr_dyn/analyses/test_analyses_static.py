@@ -9,6 +9,7 @@ import pytest
 from synthetic import cloud
 from test_analyses_kinematic import bar, slider_crank
 
+import ffr_prep as fp
 from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.analyses.states import scene_at
 from ffr_dyn.analyses.static import static
@@ -21,6 +22,9 @@ from ffr_dyn.scene.joints import Joint
 from ffr_dyn.scene.scene import Body, Scene
 from ffr_prep.body import rigid_body
 from ffr_prep.common.errors import ComputationError, InputError
+from ffr_prep.model.material import Material
+from ffr_prep.structures.frame import Member, named, polyline
+from ffr_prep.structures.sections import rectangle
 
 G = (0.0, -9.81, 0.0)
 
@@ -120,3 +124,36 @@ def test_forces_that_are_not_finite_are_named():
     assert static(scene, time=1.0).attributes["stable"]
     with pytest.raises(ComputationError, match="forces are not finite near the equilibrium"):
         static(scene, time=0.0)
+
+
+@pytest.fixture(scope="module")
+def column():
+    """A cantilever strip of 1 m in four parts, and its bending stiffness."""
+    ends = {"a": (0.0, 0.0, 0.0), "b": (1.0, 0.0, 0.0)}
+    member = Member(rectangle(0.02, 0.002), Material("steel", 2.1e11, 0.3, 7850.0), (0, 1, 0))
+    frame = named(polyline(list(ends.values()), member, elements=16), **ends)
+    model = fp.from_frame(frame, [fp.InterfaceRegion(end) for end in ends])
+    request = fp.Request(name="strip", reference=fp.MeanAxis(), reduction=fp.CraigBampton(2), parts=4)
+    return fp.reduce(model, request), 2.1e11 * 0.02 * 0.002**3 / 12
+
+
+@pytest.mark.parametrize(
+    ("load", "axes", "said"),
+    [
+        (2.4, "global", ""),
+        (2.55, "global", "lowest stiffness"),
+        (15.0, "body", ""),
+        (19.0, "body", ""),
+        (20.5, "body", "flutters"),
+    ],
+)
+def test_a_column_buckles_under_a_dead_load_and_flutters_under_one_that_follows(column, load, axes, said):
+    """By Euler at pi^2 / 4 = 2.467, by Beck (1952) at 20.05 EI / L^2, whose column has no other equilibrium than the straight
+    one, and no negative stiffness in the sense of statics before."""
+    body, stiffness = column
+    push = Load("push", "strip.b", force=(-load * stiffness, 0, 0), axes=axes)
+    root = Joint("root", "fixed", "ground.O", "strip.a")
+    result = static(Scene((Body("strip", body),), (root,), loads=(push,), ground={"O": (0, 0, 0)}))
+    unstable = [note for note in result.attributes["notes"] if "unstable" in note]
+    assert len(unstable) == bool(said) == 1 - result.attributes["stable"]
+    assert said in "".join(unstable)

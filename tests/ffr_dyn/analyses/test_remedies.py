@@ -33,8 +33,10 @@ from test_analyses_inverse import flexible_arm
 from test_analyses_kinematic import slider_crank
 from test_analyses_mixed import MOTOR, TIP, bounded, cart_with_rod, mixed, one_link, rest_to_rest
 from test_analyses_static import hanging
+from test_independence import locomotive
 
 import ffr_dyn as fd
+import ffr_prep as fp
 from ffr_dyn.analyses.assemble import assembly
 from ffr_dyn.analyses.efforts import recorded
 from ffr_dyn.analyses.events import Event
@@ -64,6 +66,7 @@ from ffr_dyn.integrators import (
     ROS2,
     DormandPrince,
     GeneralisedAlpha,
+    HalfExplicit,
     Within,
     method_named,
     stepped,
@@ -93,6 +96,10 @@ from ffr_dyn.scene.joints import Joint
 from ffr_dyn.scene.scene import Body, Scene, marker_number
 from ffr_dyn.scene.sensors import Measurement, SectionMeasurement
 from ffr_prep.common.errors import ComputationError, InputError
+from ffr_prep.model.material import Material
+from ffr_prep.structures.frame import Member, polyline
+from ffr_prep.structures.frame import named as named_frame
+from ffr_prep.structures.sections import rectangle
 
 # What is a part of a message, or one made elsewhere.
 PARTS = {
@@ -319,10 +326,26 @@ def bent(turn: float) -> Scene:
     return Scene((Body("bent", model, q=(q, q)),), ground=GROUND)
 
 
-def at_right_angle(times: tuple[float, float]) -> Result:
-    """A slider-crank with r = l, which is singular at 90 degrees: at 1 s."""
-    scene = slider_crank(0.5, 0.5, Driver("motor", "main", polynomial(1.0, np.pi / 2 - 1.0)), offset=1.0)
-    return kinematic(scene, end=times[0], output_step=times[1])
+def held_in_a_row(angle: float) -> Scene:
+    """Two parallel cranks, held at an angle: in a row where it is zero."""
+    return replace(locomotive(2, angle), drivers=(Driver("hold", "foot0", polynomial(angle)),))
+
+
+def wrung(turn: float) -> Scene:
+    """A strip in four parts, on edge, under an end moment that would bend it by so much [rad] if it were lying."""
+    ends = {"a": (0.0, 0.0, 0.0), "b": (1.0, 0.0, 0.0)}
+    member = Member(rectangle(0.02, 0.002), Material("steel", 2.1e11, 0.3, 7850.0), (0, 1, 0))
+    frame = named_frame(polyline(list(ends.values()), member, elements=8), **ends)
+    model = fp.from_frame(frame, [fp.InterfaceRegion(end) for end in ends])
+    body = fp.reduce(model, fp.Request(name="strip", reference=fp.MeanAxis(), reduction=fp.CraigBampton(1), parts=4))
+    moment = Load("moment", "strip.b", moment=(0, 2.1e11 * 0.02 * 0.002**3 / 12 * turn, 0))
+    return Scene(
+        (Body("strip", body),), (Joint("root", "fixed", "ground.O", "strip.a"),), loads=(moment,), ground=GROUND
+    )
+
+
+# Two parallel cranks, in a row at the start and after every half of a second.
+TURNED = replace(locomotive(2, 0.0, 2 * np.pi), drivers=(Driver("turn", "foot0", polynomial(0.0, 2 * np.pi)),))
 
 
 def jumping() -> Scene:
@@ -414,7 +437,10 @@ RUNS = [
         lambda: kinematic(locking(0.1, 0.5).args[0], end=1.0, output_step=0.05),
         lambda: kinematic(locking(0.1, 0.5).args[0], end=0.1, output_step=0.05),
     ),
-    Case(p(at_right_angle, (2.0, 0.5)), p(at_right_angle, (1.98, 0.22))),
+    Case(*(p(kinematic, held_in_a_row(angle), end=1.0, output_step=0.5) for angle in (0.0, 0.1))),
+    Case(lambda: static(wrung(12.0)), lambda: static(wrung(2.0))),
+    Case(p(run, TURNED, HalfExplicit(1e-3)), p(run, TURNED, RK4(1e-3))),
+    Case(*(p(inverse, TURNED, start=t, end=t + 0.2, output_step=0.1, elastic=QuasiStatic()) for t in (0.0, 0.1))),
     Case(
         lambda: inverse(jumping(), end=0.05, output_step=0.05, elastic=QuasiStatic()),
         lambda: inverse(jumping(), end=0.05, output_step=0.05, elastic=Dynamic(ROS2(1e-4))),

@@ -14,6 +14,8 @@ from ffr_dyn.consistency.mobility import mobility
 from ffr_dyn.functions.formula import formula
 from ffr_dyn.functions.rotation import euler_parameters, rotation_matrix
 from ffr_dyn.integrators import RK4
+from ffr_dyn.scene.drivers import Driver
+from ffr_dyn.scene.forces import Load
 from ffr_dyn.scene.joints import Joint
 from ffr_dyn.scene.scene import Body, Scene
 from ffr_prep.common.errors import ComputationError, InputError
@@ -55,6 +57,17 @@ def test_a_distance_that_starts_at_zero_or_below_is_refused(analysis, length):
 def test_a_distance_that_shrinks_to_zero_stops_the_run_there():
     with pytest.raises(ComputationError, match=r"at t = 0\.49\d* s the row 'distance of the points' of 'tie'"):
         forward(tied("distance", 0.5, length=formula("0.5 - t")), end=0.6, output_step=0.1, method=RK4(1e-3))
+
+
+def test_a_force_on_the_ground_alone_is_told():
+    idle = (Load("push", "ground.O", (0, 1, 0)), Load("pull", "a.b", (0, 1, 0)))
+    notes = assemble(replace(tied("revolute"), loads=idle)).notes
+    assert [note[:40] for note in notes if "does nothing" in note] == ["'push' acts on ground.O alone, and the g"]
+
+
+def test_a_driver_without_a_value_at_the_start_is_named():
+    with pytest.raises(InputError, match="driver 'motor': the function of time has no value at t = 0 s"):
+        assemble(replace(tied("revolute"), drivers=(Driver("motor", "tie", formula("log(t)")),)))
 
 
 def welded(**axes) -> Scene:

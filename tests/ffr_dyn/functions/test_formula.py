@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from contextlib import nullcontext
 
 import numpy as np
 import pytest
@@ -200,6 +201,25 @@ def test_numbers_in_formulas_have_units(text, unit, at_one):
 def test_units_that_do_not_fit_are_refused(text, unit, says):
     with pytest.raises(InputError, match=says):
         formula(text, GIVEN, unit=unit)
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "says"),
+    [
+        ("-g", "m/s^2", ""),
+        ("-heavy", "m/s^2", "comes to kg, and is given in m/s\\^2"),
+        ("w * t", "rad", ""),
+        ("heavy * t", "rad", "comes to kg s"),
+        ("g - heavy", None, "adds m/s\\^2 and kg"),
+        ("sin(often * t)", "m", "Hz counts turns"),
+        ("3 * heavy", "N", ""),  # of any unit, the 3
+        ("heavy * other", "N", ""),
+    ],
+)
+def test_parameters_with_units_are_known_where_no_number_without_one_is_beside_them(text, unit, says):
+    given = {"g": with_unit(9.81, "m/s^2"), "heavy": with_unit(9.81, "kg"), "w": with_unit(3.0, "rpm"), "other": 2.0}
+    with pytest.raises(InputError, match=says) if says else nullcontext():
+        formula(text, given | {"often": with_unit(5.0, "Hz")}, unit=unit)
 
 
 def test_of_parameters_and_of_what_is_measured_nothing_is_known():

@@ -244,7 +244,7 @@ def test_blocks_give_the_products_of_the_whole_table(mixed):
     table[alone], table[:, :, alone] = 0.0, 0.0
     table[:, :4] += np.swapaxes(table[:, :4], 0, 2)
     table[:, 4:] -= np.swapaxes(table[:, 4:], 0, 2)
-    pool, plan = in_blocks(table, 2, np.full(6, 1e-9))
+    pool, plan = in_blocks(table, 2, 1e-9)
     assert plan[HOW] == (MIXED if mixed else SORTED)
     assert pool.size < 0.4 * table.size
     table[:, 3] = 0.0  # it was rounding

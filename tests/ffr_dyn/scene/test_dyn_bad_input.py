@@ -58,8 +58,8 @@ def scene(tmp_path):
             SCENE + '[forces.f]\nkind = "joint-frictoin"\n',
             ["no kind 'joint-frictoin'", "did you mean 'joint-friction'?"],
         ),
-        (driven("1 / t"), ["angle", "no value at t = 0 s"]),
-        (driven("sqrt(t - 1)"), ["angle", "no value at t = 0 s"]),
+        (driven("1 / t"), ["driver 'motor'", "no value at t = 0 s"]),
+        (driven("sqrt(t - 1)"), ["driver 'motor'", "no value at t = 0 s"]),
     ],
 )
 def test_a_scene_file_that_says_nothing_sensible(monkeypatch, capsys, scene, text, words):
