@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ffr_dyn.analyses.forward import Forward
 from ffr_dyn.chart.diagram import Diagram, Point, spread
 from ffr_dyn.chart.draw import draw_chart
 from ffr_dyn.chart.reference import Reference
@@ -102,7 +103,8 @@ def _variant(found: Economy, choice: Choice, words: str) -> Variant:
 
 def _point(found: Economy, choice: Choice, words: str, error: Array) -> Point:
     settings, variant = found.settings, _variant(found, choice, words)
-    span = Span(settings.start, settings.end, settings.output_step, settings.stabilisation)
+    begin = settings.analysis.begin if isinstance(settings.analysis, Forward) else "as-given"
+    span = Span(settings.start, settings.end, settings.output_step, settings.stabilisation, begin)
     wall, cpu, evaluations = _timed(make(found.original, choice, span), choice, span, found.policy.timing_repeats)
     errors = {output.name: float(e) for output, e in zip(found.probe.outputs, error, strict=True)}
     kind = TOLERANCE if choice.controlled else STEP
