@@ -12,7 +12,6 @@ from sphinx_gallery.scrapers import figure_rst, matplotlib_scraper
 
 from ffr_dyn.pictures.histories import Drawing
 
-
 LOG = getLogger(__name__)
 COLOUR_BAR = "<colorbar>"
 
