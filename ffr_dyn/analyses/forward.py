@@ -202,9 +202,7 @@ def _tight(stabilisation: Stabilisation, accuracy: float) -> Stabilisation:
     return Projection(min(stabilisation.tolerance, PROJECTED * accuracy))
 
 
-def begun(
-    assembled: Assembled, start: float, begin: Beginning, method: Integrator | Within | None = None
-) -> Assembled:
+def begun(assembled: Assembled, start: float, begin: Beginning, method: Integrator | Within | None = None) -> Assembled:
     """The state that a run begins in; a method without steps of its own is no method of a periodic motion."""
     if begin not in get_args(Beginning):
         raise InputError(f"begin is {begin!r}; it must be one of {', '.join(map(repr, get_args(Beginning)))}")

@@ -63,9 +63,12 @@ class SciPy:
 class IDA:
     """SUNDIALS' IDA (Hindmarsh et al. 2005): backward differentiation of orders one to five, variable steps.
 
-    rtol, atol : its tolerances of positions, velocities and elastic coordinates; multipliers are not controlled
+    rtol : its relative tolerance [1];  atol : its absolute one, of positions [m], velocities [m/s] and
+           elastic coordinates; multipliers are not controlled
 
     It comes with the package scikit-sundae (`pip install ffr[ida]`).
+
+    Raises InputError for tolerances that double precision cannot meet.
 
     >>> result = fd.reference(scene, end=0.5, output_step=0.01, method=fd.IDA(rtol=1e-10))
     """

@@ -55,6 +55,8 @@ class OutputMeasure:
 def diagram(found: Economy) -> Diagram:
     """The runs of a search with their processor times, which takes some repetitions of each, and their errors.
 
+    Raises ComputationError where a run of the search cannot be repeated.
+
     >>> fd.draw_chart(fd.diagram(found), "search.png")
     """
     measures = tuple(

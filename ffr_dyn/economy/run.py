@@ -28,7 +28,7 @@ STATES = ("*.R", "*.p", "*.v", "*.omega_bar", "*.q", "*.q_dot")
 
 @dataclass(frozen=True)
 class Span:
-    """From `start` to `end` [s] with a row every `output_step` [s], how drift is held, and the state in which a run begins."""
+    """From `start` to `end` [s] with a row every `output_step` [s]; how drift is held, and in what state a run begins."""
 
     start: float
     end: float

@@ -102,6 +102,8 @@ def stress_report(
 def report_lines(report: StressReport) -> Iterator[str]:
     """The report in words.
 
+    Raises InputError for a report of an unknown measure.
+
     >>> print(*fd.report_lines(report), sep="\\n")  # of what `fd.stress_report` returned
     """
     of = measure(report.quantity)

@@ -183,7 +183,9 @@ def _row(entry: Mapping[str, Any], runs: int, outputs: Set[str]) -> Row:
     number, values = int(entry["run"]), {str(name): _number(value) for name, value in entry["values"].items()}
     if not (0 <= number < runs and values.keys() <= outputs | {TIME}):
         raise ValueError(number)
-    return Row(number, values, str(entry["message"]), {name: str(unit) for name, unit in entry.get("units", {}).items()})
+    return Row(
+        number, values, str(entry["message"]), {name: str(unit) for name, unit in entry.get("units", {}).items()}
+    )
 
 
 def _number(value: Any) -> Number:

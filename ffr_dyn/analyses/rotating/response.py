@@ -132,8 +132,8 @@ def response(
                displacement and velocity, positions and velocities of markers as well
     band_of  : (low, high) [Hz];  frequencies : [Hz], instead; by default the band of the first vibrations
     psd      : (frequency [Hz], one-sided density [input^2/Hz]) of a noise at the input, linear in between, zero outside
-    about    : the scene's "start", its "equilibrium" or its "steady" motion, about which inputs and outputs in the ground's
-               axes do not turn with the bodies
+    about    : the scene's "start" at `time` [s], its "equilibrium" or "steady" motion; inputs and outputs in the
+               ground's axes do not turn with the bodies
 
     The result has `frequency` [Hz], and of each output `gain`, `phase` [deg], `transfer` (real and imaginary), and `parts` of
     it by the modes that do most, named in the attribute "modes"; with a psd `density` and the attribute "rms",

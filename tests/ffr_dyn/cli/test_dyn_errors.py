@@ -13,7 +13,7 @@ from places import ROOT
 from synthetic import cloud
 
 from ffr_dyn import cli
-from ffr_dyn.analyses.forward import Forward, forward
+from ffr_dyn.analyses.forward import forward
 from ffr_dyn.consistency.assemble import assemble
 from ffr_dyn.functions.time_functions import polynomial, table
 from ffr_dyn.integrators import RK4, ROS2, GeneralisedAlpha, HalfExplicit

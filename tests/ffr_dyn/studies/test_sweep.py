@@ -15,9 +15,9 @@ from places import ROOT
 
 import ffr_dyn as fd
 import ffr_prep.cli
+from ffr_dyn.studies import draw
 from ffr_dyn.studies.draw import running_mean, tornado
 from ffr_dyn.studies.measures import attribute, measured
-from ffr_dyn.studies import draw
 from ffr_dyn.studies.plan import mark
 from ffr_dyn.studies.runs import Row, body_file
 from ffr_dyn.studies.table import Journal, journal_of
@@ -348,7 +348,12 @@ def test_the_journal_of_another_study_is_refused(folder):
 def test_units_are_those_of_the_runs_and_of_the_scene(folder, monkeypatch):
     """In the table, in its file, and on the axes of its pictures; a formula of outputs has none."""
     (folder / "bar.toml").write_text(SCENE.replace("length = 1.0", 'length = "100 cm"'))
-    outputs = {"h": "hinge.angle: history", "force": "hinge.force: largest", "e": "hinge.force: error", "w": "= force / g"}
+    outputs = {
+        "h": "hinge.angle: history",
+        "force": "hinge.force: largest",
+        "e": "hinge.force: error",
+        "w": "= force / g",
+    }
     study = fd.study(folder / "bar.toml", {"g": [1, 5, 9.81], "length": [0.5, 1.0]}, outputs)
     table = fd.sweep(study, folder / "t.nc", workers=0)
     assert table.units == {"length": "m", "time": "s", "h": "rad", "force": "N", "e": "N"}
@@ -356,9 +361,14 @@ def test_units_are_those_of_the_runs_and_of_the_scene(folder, monkeypatch):
     with h5py.File(folder / "t.nc") as file:
         assert file["force"].attrs["units"] == "N"
     surfaces = []
-    monkeypatch.setattr(draw, "_surface", lambda path, name, first, second, y: surfaces.append((name, first[0], second[0])))
+    monkeypatch.setattr(
+        draw, "_surface", lambda path, name, first, second, y: surfaces.append((name, first[0], second[0]))
+    )
     fd.plot_study(table, folder / "p", ["force", "w"])
-    assert [(name, set(axes)) for name, *axes in surfaces] == [("force [N]", {"g", "length [m]"}), ("w", {"g", "length [m]"})]
+    assert [(name, set(axes)) for name, *axes in surfaces] == [
+        ("force [N]", {"g", "length [m]"}),
+        ("w", {"g", "length [m]"}),
+    ]
 
 
 def test_pictures_are_drawn(folder):
