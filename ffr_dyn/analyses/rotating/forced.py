@@ -55,7 +55,9 @@ class Forced(OfMoment):
             metavar="NAME", required=True,
         ),
     )  # fmt: skip
-    amplitude: float = field(default=0.0, metadata=option("--amplitude", "Of the input, in its unit [N, N m, m or rad].", required=True))
+    amplitude: float = field(
+        default=0.0, metadata=option("--amplitude", "Of the input, in its unit [N, N m, m or rad].", required=True)
+    )
     quantities: tuple[str, ...] = field(
         default=(), metadata=option("--output", "Quantity, such as rod.tip.position; repeat.", required=True)
     )
