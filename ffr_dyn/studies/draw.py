@@ -17,6 +17,7 @@ from ffr_prep.common.units import bracketed, pretty
 LEVELS = 20
 LIKELY = 1.96  # standard errors of a mean that hold it with 95 % probability
 MANY = 10.0  # histories, beyond which they are drawn fainter
+TICKS = 5  # of an axis, at most: numbers such as 0.0075 need their place
 FEW = 12  # values of a parameter, up to which they are thought to be chosen, and drawn as lines
 
 
@@ -126,6 +127,7 @@ def _over_parameters(path: Path, name: str, x: dict[str, Array], y: Array) -> Pa
             else:
                 axes.plot(values, y, ".", color=PALETTE[0], markersize=3)
             axes.set_xlabel(key)
+            axes.locator_params(axis="x", nbins=TICKS)
         figure.supylabel(name)
     return path
 
@@ -153,6 +155,7 @@ def _surface(path: Path, name: str, first: tuple[str, Array], second: tuple[str,
         figure.colorbar(filled, ax=axes, label=name)
         axes.plot(at[:, 0], at[:, 1], "k.", markersize=2)
         axes.set(xlabel=first[0], ylabel=second[0])
+        axes.locator_params(nbins=TICKS)
     return path
 
 

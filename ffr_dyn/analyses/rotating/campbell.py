@@ -158,7 +158,7 @@ Measure = Callable[[float, Spectrum, int], float]
 def _off_order(ground: bool, order: float) -> Measure:
     """How far a frequency is from a multiple of the speed [rad/s].
 
-    A whirl that is just as fast as the scene stands still in the turning axes: near there its eigenvalue is real, by rounding,
+    A whirl that is just as fast as the scene stands still in the turning axes. Near there its eigenvalue is real by rounding,
     and says nothing of how fast it is seen.
     """
 
