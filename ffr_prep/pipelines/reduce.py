@@ -248,7 +248,7 @@ def stiffening_matrices(model: Model, request: Request, held: SupportedBody, bas
     Raises ComputationError when a static problem fails.
     """
     loads = known_loads(model.coupled)
-    static = solve_refined(held, loads, np.zeros((len(held.C), loads.shape[1])))[0]
+    static = solve_refined(held, loads, np.zeros((held.C.shape[0], loads.shape[1])))[0]
     K = model.stiffening(static, in_equilibrium(model.coupled, request.reference, static), basis.Z)
     return (K + K.transpose(0, 2, 1)) / 2
 

@@ -22,7 +22,7 @@ def normal_modes(model: CoupledModel, held: SupportedBody, count: int) -> tuple[
     Raises InputError when the model has fewer, ComputationError when the iteration does not converge.
     """
     size = model.K.shape[0]
-    most = size - len(held.C)
+    most = size - held.C.shape[0]
     if not 0 <= count <= most:
         raise InputError(
             f"asked for {count} normal modes of a model with {most} free degrees of freedom: ask for 0 to {most}, or "
@@ -31,7 +31,7 @@ def normal_modes(model: CoupledModel, held: SupportedBody, count: int) -> tuple[
     if count == 0:
         return np.zeros(0), np.zeros((size, 0))
     if size <= _DENSE or 3 * count > size:
-        return _dense_modes(model, held.C, count)
+        return _dense_modes(model, held.C.toarray(), count)
     return held.body.lowest(held, model.M, count)
 
 
@@ -42,7 +42,7 @@ def modes_up_to(model: CoupledModel, held: SupportedBody, frequency: float) -> t
     converge.
     """
     limit = (2 * np.pi * min(frequency, _HIGHEST)) ** 2
-    most = model.K.shape[0] - len(held.C)
+    most = model.K.shape[0] - held.C.shape[0]
     count = min(_FIRST, most)
     omega2, vectors = normal_modes(model, held, count)
     while count < most and omega2[-1] <= limit:
@@ -82,6 +82,6 @@ def constraint_modes(model: CoupledModel, fixed: SupportedBody) -> tuple[Array, 
     The stiffness is the reaction to the shapes; it is more accurate than a product with K, whose rounding errors
     scale with the stiffest motion of the mesh.
     """
-    count = len(fixed.C)
+    count = fixed.C.shape[0]
     shapes, mu = solve_refined(fixed, np.zeros((model.K.shape[0], count)), np.eye(count))
     return shapes, -(mu + mu.T) / 2

@@ -108,5 +108,5 @@ def _prescribed(model: Model, held: SupportedBody, conditions: ReferenceConditio
     -E_ij beside what the independent coordinates say.
     """
     rows = supports(model.coupled, conditions)
-    of_loads = np.linalg.lstsq((known_loads(model.coupled) @ rows.T), held.C.T, rcond=None)[0].T
+    of_loads = np.linalg.lstsq((known_loads(model.coupled) @ rows.T), held.C.T.toarray(), rcond=None)[0].T
     return np.tensordot(of_loads @ rows, second.known, 1)

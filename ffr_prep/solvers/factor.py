@@ -219,7 +219,7 @@ def _extended(solve_free: Solve, free: Array, load: Array) -> Array:
 
 
 def _flexibility(held: SupportedBody) -> Solve:
-    return lambda loads: solve_supported(held, loads, np.zeros((len(held.C), loads.shape[1])))[0]
+    return lambda loads: solve_supported(held, loads, np.zeros((held.C.shape[0], loads.shape[1])))[0]
 
 
 def _by_lanczos(advance: Advance, held: SupportedBody, M: sp.csr_array, count: int) -> tuple[Array, Array]:
@@ -233,7 +233,7 @@ def _by_lanczos(advance: Advance, held: SupportedBody, M: sp.csr_array, count: i
 
 
 def _by_slepc(process: SlepcProcess, held: SupportedBody, M: sp.csr_array, count: int) -> tuple[Array, Array]:
-    made = pencil(process, held.body.K, M, held.C, held.body.T)
+    made = pencil(process, held.body.K, M, held.C.toarray(), held.body.T)
     return mpi_modes(process, made, M, count, _about_the_lowest(held, M))
 
 
@@ -259,11 +259,11 @@ def _counted(positions: Array, advance: Advance, held: SupportedBody, M: sp.csr_
     def told(share: float, words: str) -> None:
         advance(share, f"{words} for the count of modes")
 
-    return modes_below(held.body.K, M, held.C, positions, sigma, told)
+    return modes_below(held.body.K, M, held.C.toarray(), positions, sigma, told)
 
 
 def _mpi_counted(process: SlepcProcess, held: SupportedBody, M: sp.csr_array, sigma: float) -> int:
-    return mpi_count(process, pencil(process, held.body.K, M, held.C, held.body.T), sigma)
+    return mpi_count(process, pencil(process, held.body.K, M, held.C.toarray(), held.body.T), sigma)
 
 
 # ---- supports -----------------------------------------------------------------------------------------------------
@@ -274,18 +274,19 @@ class SupportedBody:
     """A free body under the supports C u = c; C : (r, Z) independent functionals that hold all rigid motions."""
 
     body: FreeBody
-    C: Array
+    C: sp.csr_array
     flexibility: Array
     scale: Array
     bordered: tuple[Array, Array]
 
 
-def supported(body: FreeBody, C: Array) -> SupportedBody:
+def supported(body: FreeBody, C: sp.csr_array | Array) -> SupportedBody:
     """Prepare the small system of the supports C (r, Z), r >= 6.
 
     Raises ComputationError when the supports depend on one another or leave a rigid motion.
     """
-    flexibility = body.solve(np.ascontiguousarray(C.T))
+    C = sp.csr_array(C)
+    flexibility = body.solve(C.T.toarray())
     held = C @ body.T
     bordered = np.block([[-C @ flexibility, held], [held.T, np.zeros((6, 6))]])
     scale = _equilibration(bordered)
@@ -293,7 +294,7 @@ def supported(body: FreeBody, C: Array) -> SupportedBody:
     condition = np.linalg.cond(scaled)
     if not condition < 1e13:
         raise ComputationError(
-            f"the {len(C)} supports depend on one another or leave a rigid motion free (condition {condition:.1e}): "
+            f"the {C.shape[0]} supports depend on one another or leave a rigid motion free (condition {condition:.1e}): "
             "choose other reference conditions or interfaces"
         )
     return SupportedBody(body, C, flexibility, scale, scipy.linalg.lu_factor(scaled))

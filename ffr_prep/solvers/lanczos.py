@@ -57,6 +57,7 @@ def lowest_modes(
     while True:
         last = [*last[-1:], momenta]
         _append(Q, block)
+        del block  # its memory is needed
         following = flexibility(momenta)
         block, momenta, columns = _orthonormal(following, Q, M, last)
         T = _bordered(T, columns)

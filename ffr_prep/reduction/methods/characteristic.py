@@ -44,10 +44,11 @@ class CharacteristicModes:
     def basis(self, model: CoupledModel, body: FreeBody, L: Array) -> Basis:
         """Raises InputError without interfaces and for more modes than there are."""
         check_interfaces(model, "a reduction of the interfaces")
-        fixed = supported(body, model.C.toarray())
+        fixed = supported(body, model.C)
         shapes, stiffness = constraint_modes(model, fixed)
         kept = _condensed_modes(stiffness, shapes.T @ (model.M @ shapes), self.interface_modes)
-        return with_fixed_interfaces(model, body, L, fixed, self.modes, shapes @ kept, kept.T @ stiffness @ kept)
+        condensed = shapes @ kept, kept.T @ stiffness @ kept
+        return with_fixed_interfaces(model, body, L, fixed, self.modes, lambda: condensed)
 
 
 def _condensed_modes(K: Array, M: Array, selection: int | UpTo) -> Array:

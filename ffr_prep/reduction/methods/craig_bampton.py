@@ -5,7 +5,9 @@ Source: R. R. Craig, M. C. C. Bampton, AIAA Journal 6 (1968) 1313-1319.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache, partial
 
 import numpy as np
 import scipy.linalg
@@ -40,8 +42,8 @@ class CraigBampton:
     def basis(self, model: CoupledModel, body: FreeBody, L: Array) -> Basis:
         """Raises InputError without interfaces and for more modes than the model has."""
         check_interfaces(model, "Craig-Bampton")
-        fixed = supported(body, model.C.toarray())
-        return with_fixed_interfaces(model, body, L, fixed, self.modes, *constraint_modes(model, fixed))
+        fixed = supported(body, model.C)
+        return with_fixed_interfaces(model, body, L, fixed, self.modes, cache(partial(constraint_modes, model, fixed)))
 
 
 def with_fixed_interfaces(
@@ -50,12 +52,15 @@ def with_fixed_interfaces(
     L: Array,
     fixed: SupportedBody,
     modes: Selection,
-    shapes: Array,
-    stiffness: Array,
+    static: Callable[[], tuple[Array, Array]],
 ) -> Basis:
-    """The basis of normal modes with fixed interfaces and of static shapes (Z, p), whose stiffness is (p, p)."""
+    """The basis of normal modes with fixed interfaces and of static shapes (Z, p), whose stiffness is (p, p).
+
+    static : makes the shapes and the stiffness, asked for after the search for modes, which needs their memory
+    """
 
     def with_modes(omega2: Array, vectors: Array) -> Basis:
+        shapes, stiffness = static()
         K = scipy.linalg.block_diag(np.diag(omega2), stiffness)
         return diagonalised(model, *restricted(np.hstack([vectors, shapes]), K, L))
 
