@@ -92,8 +92,8 @@ def adaptive_forward(
     policy    : numbers of the estimates
 
     The result has the states (of second-order bodies those of their mean-axis form), marker motions and energies of a forward
-    run, and model.coordinates (elastic coordinates of
-    each body), energy.switched (energy that switches have added since the start, negative where they took some away).
+    run. Beside them are model.coordinates, the elastic coordinates of each body, and energy.switched, the energy that
+    switches have added since the start, negative where they took some away.
 
     Raises InputError and ComputationError as `economise`.
 

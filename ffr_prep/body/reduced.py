@@ -167,10 +167,10 @@ class FlexibleBody(Brief):
     PP_dm     : (3, 3, n, n) integral of phi_k,i phi_l,j dm at [k, l, i, j] [1]
     omega2    : (n,) squared circular frequencies of the reduced body under its reference conditions [rad^2/s^2]
     interfaces, surface : where to attach, what to draw
-    stiffening: (12 + 6 I, n, n) geometric stiffness [1/s^2] per unit of: the acceleration of the body frame less gravity
-        (3) [m/s^2], its angular acceleration (3) [rad/s^2], the products xx, yy, zz, xy, xz, yz of its angular velocity
-        (6) [rad^2/s^2], and for each of the I interfaces force (3) [N] and semitangential moment (3)
-        [N m]; all in body axes. None where it was not computed
+    stiffening: (12 + 6 I, n, n) geometric stiffness [1/s^2] per unit of 12 + 6 I loads, in body axes. The first twelve: the
+        acceleration of the body frame less gravity (3) [m/s^2], its angular acceleration (3) [rad/s^2], the products xx, yy,
+        zz, xy, xz, yz of its angular velocity (6) [rad^2/s^2]. Then for each of the I interfaces force (3) [N] and
+        semitangential moment (3) [N m]. None where it was not computed
     damping   : (n, n) symmetric damping matrix of the elastic coordinates [1/s], beside the ratios that a scene gives: from a
         finite-element model, a file, or `damped`. None where there is none
     parts     : bodies that the body is cut into, one after the other, if it is: each in the same frame, undeformed, with the

@@ -122,10 +122,10 @@ def response(
 ) -> Result:
     """How outputs of a scene answer a small harmonic input, a row for every frequency.
 
-    input    : an effort, the name of a load (one doubles it), or in words: "joint.moment" or "joint.force" along a joint
-               coordinate, "driver.moment" in the place of a driver, which then holds what it held, "driver.angle" or
-               "driver.stroke", a change of what a driver prescribes, "driver.angle_rate" and "driver.angle_acceleration", of
-               its rates, "body.point.force.x" or ".moment.z" at a marker, "base.x", an acceleration of the base,
+    input    : an effort, the name of a load (one doubles it), or in words. "joint.moment" or "joint.force" is along a joint
+               coordinate; "driver.moment" in the place of a driver, which then holds what it held; "driver.angle" or
+               "driver.stroke" a change of what a driver prescribes; "driver.angle_rate" and "driver.angle_acceleration" of
+               its rates; "body.point.force.x" or ".moment.z" at a marker; "base.x" an acceleration of the base, beside
                "base.x.velocity" and "base.x.displacement"
     outputs  : quantities ("rod.tip.acceleration": its components) or components; with a base as input, accelerations of
                markers are absolute, as accelerometers have them, so that the gain is the transmissibility; of its
