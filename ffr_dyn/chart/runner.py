@@ -253,7 +253,7 @@ def _why(future: Any) -> str:
 
 @contextmanager
 def pool(workers: int | None = None, cluster: str | None = None) -> Iterator[Pool]:
-    """Where to run: a cluster by its scheduler's address, local processes (default: half the processors), or with 0 here.
+    """The workers of a chart: a cluster by its scheduler's address, local processes (default: half the processors), or none (0).
 
     Raises InputError where Dask is missing or no scheduler answers.
 

@@ -113,7 +113,7 @@ def _enough(count: int, turn: float, share: float) -> int:
 
 
 def parts_needed(scene: Scene, result: Result, angle: float = BENT) -> dict[str, int]:
-    """How many equal parts each flexible body of a scene needs, by what it does in a result; 1 where one will do.
+    """The number of equal parts that each flexible body of a scene needs, by what it does in a result; 1 where one will do.
 
     With so many none of them turns within itself by more than the angle [rad], or deflects by more than a tenth of its size.
 

@@ -38,7 +38,7 @@ KEPT = ("*.R", "*.p", "*.v", "*.omega_bar", "*.position", "*.velocity", "energy.
 
 @dataclass(frozen=True)
 class Adaptation:
-    """When modes enter and leave.
+    """The thresholds at which modes enter and leave.
 
     enter : share of a tolerance above which a mode that is left out enters [1]
     leave : share [1] below which a mode that is there leaves; well below `enter`, so that it does not come back at once

@@ -112,7 +112,7 @@ def forced(
     about: About = "start",
     path: str | Path | None = None,
 ) -> Result:
-    """How a scene vibrates under a harmonic input of a given amplitude, over its frequency, with all that is nonlinear.
+    """The vibration of a scene under a harmonic input of a given amplitude, over its frequency, with all that is nonlinear.
 
     input     : as of `response`: an effort or, in words, "joint.moment", "body.point.force.x", "driver.angle", "base.x" and
                 "base.x.displacement"; of a load its share

@@ -120,7 +120,7 @@ def response(
     time: float = 0.0,
     path: str | Path | None = None,
 ) -> Result:
-    """How outputs of a scene answer a small harmonic input, a row for every frequency.
+    """The response of outputs of a scene to a small harmonic input, a row for every frequency.
 
     input    : an effort, the name of a load (one doubles it), or in words. "joint.moment" or "joint.force" is along a joint
                coordinate; "driver.moment" in the place of a driver, which then holds what it held; "driver.angle" or
