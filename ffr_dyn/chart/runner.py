@@ -253,7 +253,7 @@ def _why(future: Any) -> str:
 
 @contextmanager
 def pool(workers: int | None = None, cluster: str | None = None) -> Iterator[Pool]:
-    """The workers of a chart: a cluster by its scheduler's address, local processes (default: half the processors), or none (0).
+    """The workers of a chart: a cluster by its address, local processes (default: half the processors), or none (0).
 
     Raises InputError where Dask is missing or no scheduler answers.
 
