@@ -324,7 +324,7 @@ def _sizes(body: FlexibleBody, used: Sequence[str]) -> Array:
 
 
 def _flat(body: FlexibleBody, k: int, used: Sequence[str]) -> FlexibleBody:
-    """The body with zeros for what in-plane modes do across the plane, which of a symmetric body is rounding.
+    """The body without what in-plane modes do across its plane, which of a symmetric body is rounding.
 
     Rows of joints across the plane then vanish exactly, however large the modes are.
     """
@@ -335,6 +335,7 @@ def _flat(body: FlexibleBody, k: int, used: Sequence[str]) -> FlexibleBody:
     P_dm[k] = 0.0
     for part in (rP_dm, PP_dm):
         part[[a, b, k, k], [k, k, a, b]] = 0.0
+    rP_dm[k, [a, b]] = height_of(body, k, tuple(used)) * P_dm[[a, b]]
     interfaces = tuple(_flat_marker(i, k) if i.name in used else i for i in body.interfaces)
     stiffening = None if body.stiffening is None else _matrices_in_plane(body.stiffening, _first_loads(body, used), k)
     return replace(body, P_dm=P_dm, rP_dm=rP_dm, PP_dm=PP_dm, interfaces=interfaces, stiffening=stiffening)
