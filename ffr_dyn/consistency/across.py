@@ -42,11 +42,10 @@ def rows_across(scene: Scene, blocks: list[Block], time: float) -> Found:
 
     Looked at in the position and with the motion that the scene declares, and at random in the plane around it.
     """
-    heights = _heights(scene)
-    key, flexible = (heights, _key(scene, blocks, time)), [body.model for body in scene.bodies if body.model.n]
+    key, flexible = (_heights(scene), _key(scene, blocks, time)), [body.model for body in scene.bodies if body.model.n]
     models, found = _KNOWN.get(key, ([], None))
     if found is None or any(ref() is not model for ref, model in zip(models, flexible, strict=True)):
-        found = _looked_at(constraints_of(scene, blocks, time), heights)
+        found = _looked_at(constraints_of(scene, blocks, time))
         found[0].setflags(write=False)
         if len(_KNOWN) >= MOST:
             _KNOWN.clear()
@@ -94,14 +93,14 @@ def _turned_about(place: Layout, heights: tuple[float, ...]) -> csr_array:
     return T.tocsr()
 
 
-def _looked_at(constraints: Constraints, heights: tuple[float, ...]) -> Found:
+def _looked_at(constraints: Constraints) -> Found:
     scene, place, rng = constraints.scene, constraints.place, np.random.default_rng(0)
     start, v = initial_state(scene, place)
     active = np.zeros(place.v_size, bool)
     for b, n in enumerate(place.n):
         active[[place.iv[b] + c for c in (*place.active(b), *range(6, 6 + n))]] = True
     inside, outside, left, jacobians = [], [], [], []
-    turned = _turned_about(place, heights)
+    turned = _turned_about(place, _heights(scene))
     for scale in (0.0, 1e-2, 1e-2):
         step = np.where(active, scale * rng.normal(size=place.v_size), 0.0)
         x, speeds = moved(place, start, step), v + to_global_axes(place, start, 100 * step)

@@ -33,7 +33,7 @@ for T in (T0, T0 / 2):
     scene = fd.Scene(bodies, joints, drivers, ground={"A": (0, 0, 0), "B": (L, 0, 0)}, gravity=(0, 0, -9.81))
     result = fd.forward(fd.scene_at(scene, fd.static(scene)), end=20.0, output_step=0.05, method=fd.ROS3(5e-3))
     swing = (result["load.R.y"] - result["girder.mid.position.y"]) / rope
-    plt.plot(result.time, np.degrees(swing), label=f"gathers speed for {T / T0:g} periods")
+    plt.plot(result.time, np.degrees(swing), label=f"speed gathered in {T / T0:g} T₀")
     left.append(np.abs(swing[result.time > T]).max())
 plt.gca().set(xlabel="time [s]", ylabel="swing [°]")
 plt.legend(loc="lower right")

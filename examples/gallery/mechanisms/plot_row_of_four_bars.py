@@ -35,7 +35,7 @@ pin = result["crank0.b.position"] @ (1, 1j, 0)
 plt.plot(result.time, pin.real, result.time, pin.imag, linewidth=1)
 plt.plot([5, 10, 20], np.real(EXACT), "ko", [5, 10, 20], np.imag(EXACT), "ks")
 plt.gca().set(xlabel="time [s]", ylabel="first pin [m]")
-plt.legend(["x", "y", "x, published solution", "y"], loc="upper left")
+plt.legend(["x", "y", "x, published", "y"], loc="lower center", bbox_to_anchor=(0.5, 1), ncols=4)
 fd.animate(result, colour="body")
 
 # %%

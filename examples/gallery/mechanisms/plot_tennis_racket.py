@@ -22,7 +22,7 @@ omega, t = result["nut.omega_bar"], result.time
 momentum = np.array([1, 2, 3]) * omega
 plt.plot(t, omega, label=["x: least inertia", "y: middle", "z: greatest"])
 plt.gca().set(xlabel="time [s]", ylabel="angular velocity in body axes [rad/s]")
-plt.legend(loc="lower right")
+plt.legend(loc="lower center", bbox_to_anchor=(0.5, 1), ncols=3)
 
 # %%
 # Half a period lies between two moments when the rate about the middle axis changes its sign.
