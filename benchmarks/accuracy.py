@@ -5,7 +5,7 @@
 For every scene, with the step that is found for an accuracy of 1e-3 and with steps given around it:
 
     pairs    the error that a run tells of every default output over the true one, where the true one is 1e-6 to 0.5 of the
-             range: share within 0.3 to 5, share below 0.1, least and largest
+             range and more than rounding: share within 0.3 to 5, share below 0.1, least and largest
     places   the true error of positions and angles, in thousandths of their ranges, with the step that was found
     forces   the same of forces, moments and deflections that are not told to ring
     silent   true error over three times the told one, the worst of all outputs
@@ -35,7 +35,7 @@ from ffr_dyn.analyses.checkpoint import fingerprint
 from ffr_dyn.analyses.forward import DRIVING, PLACES, forward
 from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.consistency.assemble import assemble
-from ffr_dyn.consistency.step_error import largest_difference, ranges
+from ffr_dyn.consistency.step_error import largest_difference, ranges, roundings
 from ffr_dyn.consistency.unresolved import vibrations
 from ffr_dyn.integrators import RK4, Within, method_named
 from ffr_dyn.integrators.stabilisation import Projection
@@ -152,10 +152,10 @@ def compared(found: Result | None, true: Truth) -> tuple[list[float], float]:
     """Told over true errors, and the worst of the true error over three times the told one."""
     if found is None:
         return [], 0.0
-    pairs, silent, scales = [], 0.0, ranges(true.run)
+    pairs, silent, scales, rounding = [], 0.0, ranges(true.run), roundings(true.run)
     for name, (told, _) in found.attributes["errors"].items():
         off = largest_difference(found[name], true.run[name])
-        if max(LEAST * scales[name], true.own[name]) < off < MOST * scales[name]:
+        if max(LEAST * scales[name], rounding[name], true.own[name]) < off < MOST * scales[name]:
             pairs.append(told / off)
             silent = max(silent, off / (3.0 * told))
     return pairs, silent

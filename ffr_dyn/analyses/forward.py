@@ -42,6 +42,7 @@ PROJECTED = (
     1e-8  # of the accuracy [m, -], that constraints are closed to: 1e-9 m moved forces by up to 1e-3 of their range
 )
 SURE = 2  # order that linearly implicit methods keep where elastic forces are stiff
+PARTLY_STIFF = 2.15  # order of those of order three, of an output of which that is not known
 SLOW = 0.7  # a ringing output's error falls slower than the step to this power,
 IN_COMPANY = 1.4  # or to this one, if it is of vibration, where others ring
 QUICK = 1e7  # microseconds of the further runs, by `_cost`, up to which they are made unasked
@@ -285,7 +286,7 @@ def _told(trial: _Trial, other: Any, *longer: Any) -> _Trial:
     """The run with its errors, also by what `_further` returned."""
     if _failed(other):
         return replace(trial, errors={})
-    order = trial.method.order if _share(trial.method) is None else SURE
+    order = PARTLY_STIFF if _share(trial.method) == 0.5 else trial.method.order
     twins = (*trial.twins, *(twin for twin in longer if not _failed(twin)))
     return replace(trial, twins=twins, errors=step_errors(trial.result, other, order, twins))
 

@@ -14,11 +14,12 @@ For ROS3, whose twin is of lower order and has half the step,
     v1 = min(max |R(h) - T(h/2)|, max |R(h) - E|)    too large where vibration is resolved, by its phase;
                                                      E of T(h/2) and T(r h/2) by the order of the twin
     v2 = largest difference of the amplitudes of R(h) and T(h/2)    too small where it is resolved in part
-    v = 2.7 sqrt(v1 v2), but within v1/3 and v1
+    v = 3 sqrt(v1 v2), but within v1/2.5 and v1
 
 with amplitudes of what rows are off the curve through their neighbours, over windows of 16 rows: vibration that is not
 resolved looks like noise there. It tells nothing of what vibration does to slow motion, hence the lower limit. Stiff elastic
-forces take ROS3 down to order two, which p is for it. The factors were measured on the benchmark set
+forces take ROS3 down to order two, and whether they do is not known of an output. With p = 2.15 the error is about right if
+they do; if they do not it is 3.4 times too large at steps four times as long. The factors were measured on the benchmark set
 (`python -m benchmarks.accuracy`).
 """
 
@@ -38,7 +39,7 @@ VIBRATION = 4.5  # v over s beyond which a difference is vibration that the step
 LITTLE = 1e-3  # of the largest range of its kind: an output that moves by less counts as if it moved by this
 ARM = 1e-6  # of the largest range of forces times that of positions, the same for moments
 IN_PART = 1.5  # of what a twin with the same step is off
-MIDDLE, FLOOR, WINDOW = 2.7, 3.0, 16  # of amplitudes beside a twin with half the step
+MIDDLE, FLOOR, WINDOW = 3.0, 2.5, 16  # of amplitudes beside a twin with half the step
 TWIN = 2  # order of twins
 FAR, NEXT = 0.1, 2.0  # of the range, by which a step up to so many times as long makes a difference of order one
 NOISE = (70 / 36) ** 0.5  # by which rows without relation are farther off the curve than they are large
@@ -86,7 +87,7 @@ def _columns(run: Result, names: Iterable[str]) -> _Columns:
     return _Columns(known, first, np.concatenate([np.zeros((run.time.size, 0)), *parts], axis=1))
 
 
-def step_errors(run: Result, other: Beside | None, order: int, twins: Sequence[Beside] = ()) -> dict[str, StepError]:
+def step_errors(run: Result, other: Beside | None, order: float, twins: Sequence[Beside] = ()) -> dict[str, StepError]:
     """The error of every output of a run.
 
     other : the same with another step, None where the twins have told enough;  order : that is sure of the method
@@ -106,7 +107,7 @@ def step_errors(run: Result, other: Beside | None, order: int, twins: Sequence[B
     return found
 
 
-def _by_order(between: Array, ratio: float, order: int, far: Array) -> tuple[Array, Array]:
+def _by_order(between: Array, ratio: float, order: float, far: Array) -> tuple[Array, Array]:
     """(O,) what runs differ by whose steps have this ratio, as an error of the order, and s."""
     smooth: Array = between * abs(1.0 / (ratio**order - 1.0))
     return smooth, np.where(between > far, between * abs(1.0 / (ratio - 1.0)), smooth) if ratio <= NEXT else smooth
@@ -190,17 +191,7 @@ def largest_difference(one: Array, other: Array) -> float:
 def ranges(run: Result) -> dict[str, float]:
     """Of every output but the violations of constraints: the largest range of a component, floored by those of its kind (the
     last part of its name), where next to nothing moves, and by rounding."""
-    spans: dict[str, float] = {}
-    sizes: dict[str, float] = {}
-    for names in _batches(run, (name for name in run.quantities if not name.startswith("constraint."))):
-        of = _columns(run, names)
-        moved = np.ptp(of.table, axis=0) if len(of.table) else np.zeros(of.table.shape[1])
-        spans |= zip(names, of.largest(moved).tolist(), strict=True)
-        for name, size in zip(names, of.largest(np.abs(of.table).max(axis=0, initial=0.0)).tolist(), strict=True):
-            sizes[_kind(name)] = max(size, sizes.get(_kind(name), 0.0))
-    sizes["position"] = max(
-        sizes.get("position", 0.0), run.attributes.get("length", 0.0)
-    )  # a pivot at the origin is at zero
+    spans, sizes = _spans_and_sizes(run)
     largest: dict[str, float] = {}
     for name, span in spans.items():
         largest[_kind(name)] = max(span, largest.get(_kind(name), 0.0))
@@ -213,6 +204,27 @@ def ranges(run: Result) -> dict[str, float]:
         floors[kind] = max(floors.get(kind, 0.0), floor)
     rounding = _rounding(run, sizes)
     return {name: max(span, floors[_kind(name)], rounding(run.quantities[name].unit)) for name, span in spans.items()}
+
+
+def roundings(run: Result) -> dict[str, float]:
+    """Of every output but the violations of constraints, what is rounding in its unit."""
+    spans, sizes = _spans_and_sizes(run)
+    of_unit = _rounding(run, sizes)
+    return {name: of_unit(run.quantities[name].unit) for name in spans}
+
+
+def _spans_and_sizes(run: Result) -> tuple[dict[str, float], dict[str, float]]:
+    """The largest range of a component of every output, and the largest number of every kind."""
+    spans: dict[str, float] = {}
+    sizes: dict[str, float] = {}
+    for names in _batches(run, (name for name in run.quantities if not name.startswith("constraint."))):
+        of = _columns(run, names)
+        moved = np.ptp(of.table, axis=0) if len(of.table) else np.zeros(of.table.shape[1])
+        spans |= zip(names, of.largest(moved).tolist(), strict=True)
+        for name, size in zip(names, of.largest(np.abs(of.table).max(axis=0, initial=0.0)).tolist(), strict=True):
+            sizes[_kind(name)] = max(size, sizes.get(_kind(name), 0.0))
+    length = run.attributes.get("length", 0.0)  # as a pivot at the origin is at zero
+    return spans, sizes | {"position": max(sizes.get("position", 0.0), length)}
 
 
 def _rounding(run: Result, sizes: dict[str, float]) -> Callable[[str], float]:
