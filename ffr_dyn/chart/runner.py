@@ -65,7 +65,7 @@ class Span:
     begin: Beginning = "as-given"
 
     @property
-    def integrated(self) -> dict[str, float]:
+    def integrated(self) -> dict[str, Any]:
         """What `integrate` is told of it."""
         return {"start": self.start, "end": self.end, "output_step": self.output_step}
 

@@ -78,9 +78,10 @@ def _said_by(block: Block, word: Word, time: float) -> Hashable:
 
 def _heights(scene: Scene) -> tuple[float, ...]:
     """[m] along the normal, in its own axes, of the plane in which each body moves above the origin of its frame."""
-    normals = [body_normal(body, AXES.index(scene.plane)) for body in scene.bodies]
-    used = [used_interfaces(scene, body) for body in scene.bodies]
-    return tuple(height_of(body.model, *of) for body, *of in zip(scene.bodies, normals, used, strict=True))
+    normal = AXES.index(scene.plane)
+    return tuple(
+        height_of(body.model, body_normal(body, normal), used_interfaces(scene, body)) for body in scene.bodies
+    )
 
 
 def _turned_about(place: Layout, heights: tuple[float, ...]) -> csr_array:
