@@ -92,6 +92,8 @@ def unit(effort: Effort) -> str:
 def with_effort(scene: Scene, effort: Effort, times: Array, values: Array) -> Scene:
     """The scene with an effort of the values (T,) at times (T,) [s], splined, held outside; to be run forward.
 
+    Raises InputError for too few rows, times that do not increase, and values that are not one for each time.
+
     >>> forward = fd.with_effort(scene, torque, result.time, result["torque.effort"])
     """
     return with_function(scene, effort, recorded(times, values))
@@ -162,7 +164,7 @@ def effort_slots(at: Evaluator, efforts: tuple[Effort, ...]) -> tuple[Array, Arr
 
 
 def recorded(times: Array, values: Array, *, rates: Array | None = None, degree: int = 5) -> TimeFunction:
-    """A history (T,) at times (T,) [s] as a function of time: a spline of odd `degree`, smooth enough to drive with.
+    """The values (T,) at times (T,) [s] as a function of time: a spline of odd `degree`, smooth enough to drive with.
 
     rates : (T,) rates of the values, where they were recorded too. The spline then goes through them, and through the values
             in the mean. Its second derivative, which says what force a known motion needs, magnifies the rounding of a record

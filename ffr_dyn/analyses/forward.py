@@ -185,7 +185,7 @@ def forward(
     """
     check_output_step(output_step)
     check_method(method)
-    assembled = _begun(assemble(scene, time=start) if assembled is None else assembled, start, begin, method)
+    assembled = begun(assemble(scene, time=start) if assembled is None else assembled, start, begin, method)
     common: dict[str, Any] = {"start": start, "end": end, "output_step": output_step, "stabilisation": stabilisation}
     common |= {"outputs": outputs, "progress": progress, "stopwatch": stopwatch}
     wanted = Within() if method is None else method
@@ -210,8 +210,8 @@ def _tight(stabilisation: Stabilisation, accuracy: float) -> Stabilisation:
     return Projection(min(stabilisation.tolerance, PROJECTED * accuracy))
 
 
-def _begun(assembled: Assembled, start: float, begin: Beginning, method: Integrator | Within | None) -> Assembled:
-    """The state that a run begins in."""
+def begun(assembled: Assembled, start: float, begin: Beginning, method: Integrator | Within | None = None) -> Assembled:
+    """The state that a run begins in; a method without steps of its own is no method of a periodic motion."""
     if begin not in get_args(Beginning):
         raise InputError(f"begin is {begin!r}; it must be one of {', '.join(map(repr, get_args(Beginning)))}")
     if begin == "quasi-static":

@@ -65,7 +65,7 @@ class Linearisation(Brief):
     seen        : (2d,) [Hz] frequencies seen from the ground, of scenes that turn: positive where the whirl is forward
     whirl       : (2d,) share of the amplitude that whirls so, 1 for a circle and 1/2 for a line in the turning axes; nan of
                   what does not turn, or vibrates along the axis
-    error       : relative difference of A from step halving; zero at rest and in steady motion, where A is exact
+    error       : [1] relative difference of A from step halving; zero at rest and in steady motion, where A is exact
 
     >>> found = fd.linearise(scene)
     >>> np.abs(found.eigenvalues) / (2 * np.pi)  # [Hz]

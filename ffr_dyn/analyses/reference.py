@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ffr_dyn.analyses.forward import Beginning, begun
 from ffr_dyn.analyses.ida import by_ida
 from ffr_dyn.analyses.integration import geometry, with_all_reactions
 from ffr_dyn.analyses.outcome import output_times
@@ -62,9 +63,12 @@ class SciPy:
 class IDA:
     """SUNDIALS' IDA (Hindmarsh et al. 2005): backward differentiation of orders one to five, variable steps.
 
-    rtol, atol : its tolerances of positions, velocities and elastic coordinates; multipliers are not controlled
+    rtol : its relative tolerance [1];  atol : its absolute one, of positions [m], velocities [m/s] and
+           elastic coordinates; multipliers are not controlled
 
     It comes with the package scikit-sundae (`pip install ffr[ida]`).
+
+    Raises InputError for tolerances that double precision cannot meet.
 
     >>> result = fd.reference(scene, end=0.5, output_step=0.01, method=fd.IDA(rtol=1e-10))
     """
@@ -93,6 +97,7 @@ def reference(
     method: Reference = SciPy(),
     start: float = 0.0,
     outputs: Sequence[str] = ("default",),
+    begin: Beginning = "as-given",
     path: str | Path | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Result:
@@ -103,7 +108,7 @@ def reference(
     >>> exact = fd.reference(scene, end=0.5, output_step=0.01)
     """
     times = output_times(start, end, output_step)
-    assembled = assemble(scene, time=start)
+    assembled = begun(assemble(scene, time=start), start, begin)
     at = evaluator(assembled.system)
     wanted = selected(assembled.system, outputs)
     if needs_every_step(wanted):

@@ -33,7 +33,10 @@ class Charted:
 
 @dataclass(frozen=True)
 class Settings:
-    """An analysis over a time [s]; `method` and `stabilisation` are of those that integrate, `chart` of forward dynamics.
+    """An analysis over a time.
+
+    start, end : of the time [s];  output_step : between rows [s];  outputs : names or patterns of the quantities to keep
+    method, stabilisation : of analyses that integrate;  chart : of forward dynamics
 
     >>> result = fd.run(scene, fd.Settings(start=0.0, end=1.0, output_step=0.01, method=fd.ROS2(1e-3)))
     """

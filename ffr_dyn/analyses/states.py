@@ -32,6 +32,8 @@ _HISTORIES = {"position": "R", "rotation": "p", "velocity": "v", "omega_bar": "o
 def held(scene: Scene, time: float) -> Scene:
     """The scene with every driver and every length that is a function of time held at its value at `time` [s], at rest.
 
+    Raises InputError for an argument that is no scene.
+
     >>> result = fd.forward(fd.held(scene, 0.1), end=1.0, output_step=0.01)
     """
     require_scene(scene)

@@ -110,6 +110,8 @@ def quantities_of(scene: Scene, start: float = 0.0) -> dict[str, str]:
 def measures_of(scene: Scene, texts: Sequence[str], start: float = 0.0) -> tuple[Measure, ...]:
     """The measures that texts name; without any, those of `default_measures`.
 
+    Raises InputError for a text that names no measure of the scene.
+
     >>> measures = fd.measures_of(scene, ["deflection:rod"])
     """
     quantities = quantities_of(scene, start)
@@ -138,7 +140,7 @@ def work_precision(
     methods  : steps [s] or tolerances by method, None for a ladder that is chosen; default all methods
     models   : what is simplified; the reference has the full one
     limit    : wall time [s] that a run may take
-    wanted   : relative error that the reference should have, see `reference`
+    wanted   : relative error [1] that the reference should have, see `reference`
     tell     : told how the reference is found;  progress : told how many variants are done, of how many
 
     Raises InputError for what cannot be compared, ComputationError where not a single run of the reference is possible.

@@ -25,6 +25,8 @@ Item = dict[str, Any]
 def write_page(diagram: Diagram, path: str | Path) -> Path:
     """Write the page, atomically: lines with every variant's numbers under the mouse, and menus for measure and cost.
 
+    Raises InputError for a path that is a folder or a link, ComputationError where the file cannot be written.
+
     >>> fd.write_page(diagram, "chart.html")
     """
     path = Path(path)

@@ -25,11 +25,12 @@ from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
+from ffr_dyn.analyses.forward import Beginning, begun
 from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.chart.measures import Measure
 from ffr_dyn.chart.variants import Variant
 from ffr_dyn.compile.first_use import ensure_compiled
-from ffr_dyn.consistency.assemble import assemble
+from ffr_dyn.consistency.assemble import Assembled, assemble
 from ffr_dyn.functions.stopwatch import Stopwatch
 from ffr_dyn.functions.together import alone, processors
 from ffr_dyn.integrators.stabilisation import Projection, Stabilisation
@@ -53,12 +54,20 @@ _CONNECT = 10.0  # s to wait for the scheduler of a cluster
 class Span:
     """From `start` to `end` with a row every `output_step` [s].
 
+    begin : the state in which a run begins, as of `forward`; each model has its own
+
     >>> with fd.pool() as workers: diagram = fd.work_precision(scene, fd.Span(0.5, 1e-3), workers)
     """
 
     end: float
     output_step: float
     start: float = 0.0
+    begin: Beginning = "as-given"
+
+    @property
+    def integrated(self) -> dict[str, Any]:
+        """What `integrate` is told of it."""
+        return {"start": self.start, "end": self.end, "output_step": self.output_step}
 
 
 @dataclass(frozen=True)
@@ -111,10 +120,11 @@ def perform(job: Job) -> Outcome | Failure:
         ensure_compiled(type(method))
         outputs = _outputs(scene, job)
         _warm_up(scene, method, job)
-        result, wall, cpu = _clocked(scene, method, job, outputs)
+        assembled = begun(assemble(scene, time=job.span.start), job.span.start, job.span.begin)
+        result, wall, cpu = _clocked(assembled, method, job, outputs)
         times = [(wall, cpu)]
         while _wants_more(times, job.repeats):
-            times.append(_clocked(scene, method, job, outputs)[1:])
+            times.append(_clocked(assembled, method, job, outputs)[1:])
     except (InputError, BodyError, ComputationError) as error:
         return Failure(str(error))
     values = {measure.name: measure.values(result) for measure in job.measures}
@@ -156,18 +166,17 @@ def _warm_up(scene: Scene, method: Any, job: Job) -> None:
     _WARM.add(type(method))
 
 
-def _clocked(scene: Scene, method: Any, job: Job, outputs: tuple[str, ...]) -> tuple[Result, float, float]:
-    began, stopwatch, span = time.monotonic(), Stopwatch(), job.span
+def _clocked(assembled: Assembled, method: Any, job: Job, outputs: tuple[str, ...]) -> tuple[Result, float, float]:
+    began, stopwatch = time.monotonic(), Stopwatch()
 
     def watch(reached: float) -> None:
         if time.monotonic() - began > job.limit:
             raise ComputationError(f"took longer than {job.limit:g} s; it had reached t = {reached:.6g} s")
 
     result = integrate(
-        scene,
-        start=span.start,
-        end=span.end,
-        output_step=span.output_step,
+        assembled.system.scene,
+        **job.span.integrated,
+        assembled=assembled,
         method=method,
         stabilisation=job.stabilisation,
         outputs=outputs,
@@ -244,7 +253,7 @@ def _why(future: Any) -> str:
 
 @contextmanager
 def pool(workers: int | None = None, cluster: str | None = None) -> Iterator[Pool]:
-    """Where to run: a cluster by its scheduler's address, local processes (default: half the processors), or with 0 here.
+    """The workers of a chart: a cluster by its address, local processes (default: half the processors), or none (0).
 
     Raises InputError where Dask is missing or no scheduler answers.
 

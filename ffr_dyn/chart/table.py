@@ -37,6 +37,8 @@ def rows(diagram: Diagram) -> Iterator[list[object]]:
 def write_table(diagram: Diagram, path: str | Path) -> Path:
     """Write the table as comma-separated values (RFC 4180), atomically.
 
+    Raises InputError for a path that is a folder or a link, ComputationError where the file cannot be written.
+
     >>> fd.write_table(diagram, "chart.csv")
     """
     path = Path(path)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ffr_dyn.cli.run import begins_as_given, parameter_option, require_after, scene_argument
+from ffr_dyn.cli.run import parameter_option, require_after, scene_argument
 from ffr_prep.common.command import OUTPUT_FILE, FiniteRange, reserve
 from ffr_prep.common.entries import assignments
 from ffr_prep.common.errors import InputError
@@ -110,7 +110,7 @@ def chart(
     output = output or scene.with_suffix(".chart")
     for suffix in SUFFIXES:
         reserve("-o", output.with_name(output.name + suffix))
-    span = Span(settings.end if end is None else end, settings.output_step, settings.start)
+    span = Span(settings.end if end is None else end, settings.output_step, settings.start, settings.analysis.begin)
     asked = settings.chart
     compared = _methods(methods) if methods else {name: numbers or None for name, numbers in asked.methods} or None
     numbers = asked.modes if modes is None else _numbers(modes)
@@ -123,7 +123,7 @@ def chart(
             repeats=repeats, limit=limit, wanted=wanted, tell=lambda line: click.echo(f"reference    {line}"),
             progress=update,
         )  # fmt: skip
-    for line in (*begins_as_given(settings.analysis), *_report(found, against)):
+    for line in _report(found, against):
         click.echo(line)
     for path in _write(found, output, against):
         click.echo(f"written      {path}")

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from ffr_dyn.cli.run import begins_as_given, over_time, parameter_option, require_after, scene_argument
+from ffr_dyn.cli.run import over_time, parameter_option, require_after, scene_argument
 from ffr_prep.common.command import OUTPUT_FILE, reserve
 from ffr_prep.common.entries import assignments
 
@@ -70,8 +70,6 @@ def economise(
     report = report or target.with_suffix(".html")
     reserve("--report", report, (".html", ".md", ".txt"))
     reserve("--chart", chart, (".png", ".svg"))
-    for line in begins_as_given(analysis):
-        click.echo(line)
     found = search(
         loaded,
         outputs,
@@ -82,6 +80,7 @@ def economise(
         verify=verify,
         stabilisation=settings.stabilisation,
         events=analysis.events,
+        begin=analysis.begin,
         tell=lambda stage: click.echo(f"... {stage}", err=True),
     )
     save_changed(found.scene, found.settings, target, scene, assignments(parameters))

@@ -17,7 +17,9 @@ _FORMAT = "{desc}: {percentage:3.0f} % |{bar}| t = {n:.4g} of {total:.4g} s, {re
 def progress(
     label: str, end: float, *, start: float = 0.0, stream: TextIO | None = None
 ) -> Iterator[Callable[[float], None]]:
-    """Yields ``update(t)``, to be called with the simulated time t [s], from start to end, as often as one likes.
+    """Yields ``update(t)``, to be called with the simulated time t, as often as one likes.
+
+    start, end : first and last time [s];  label : in front of the bar
 
     Written to stream (standard error by default), a few times a second, and only when that is a terminal or the cell of a
     notebook.

@@ -103,12 +103,6 @@ def require_after(option: str, end: float | None, start: float) -> None:
         raise InputError(f"{option} {end:g}: give a time after the start, {start:g} s")
 
 
-def begins_as_given(analysis: Any) -> list[str]:
-    """A note where the forward dynamics of a file begins in another state than the scene's, which not every command does."""
-    begin = getattr(analysis, "begin", "as-given")
-    return [f'note         starts as the scene gives it: begin = "{begin}" is of `run` alone'] * (begin != "as-given")
-
-
 def over_time(
     settings: Settings | MomentSettings,
     analysis: OverTime,

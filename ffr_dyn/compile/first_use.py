@@ -35,6 +35,8 @@ def begin_compiling(*kinds: type[Integrator], forces: Sequence[Kernel] = FORCES)
 
     forces : kernels of the scene's forces
 
+    Raises InputError for a kernel that is none of a force.
+
     >>> fd.begin_compiling(fd.ROS2)
     """
     _begin(kinds, _of_any_scene(), forces)

@@ -12,15 +12,17 @@ import weakref
 from collections.abc import Hashable
 
 import numpy as np
-from scipy.sparse import csr_array
+from scipy.sparse import csr_array, lil_array
 
 from ffr_dyn.closing.constraints import Constraints, constraints_of, rows_at
 from ffr_dyn.closing.row_space import Matrix, independent
 from ffr_dyn.equations.constraint_rows import Block, drive_at
-from ffr_dyn.equations.layout import initial_state, moved, to_global_axes
+from ffr_dyn.equations.layout import Layout, initial_state, moved, to_global_axes
 from ffr_dyn.functions.time_functions import POLYNOMIAL, TimeFunction
 from ffr_dyn.scene.joints import Word
-from ffr_dyn.scene.scene import Body, Scene
+from ffr_dyn.scene.scene import Body, Scene, body_normal, used_interfaces
+from ffr_dyn.variants.aligned import height_of
+from ffr_dyn.variants.plane import AXES
 from ffr_prep.body import FlexibleBody
 from ffr_prep.common.arrays import Array
 
@@ -40,7 +42,7 @@ def rows_across(scene: Scene, blocks: list[Block], time: float) -> Found:
 
     Looked at in the position and with the motion that the scene declares, and at random in the plane around it.
     """
-    key, flexible = _key(scene, blocks, time), [body.model for body in scene.bodies if body.model.n]
+    key, flexible = (_heights(scene), _key(scene, blocks, time)), [body.model for body in scene.bodies if body.model.n]
     models, found = _KNOWN.get(key, ([], None))
     if found is None or any(ref() is not model for ref, model in zip(models, flexible, strict=True)):
         found = _looked_at(constraints_of(scene, blocks, time))
@@ -74,6 +76,24 @@ def _said_by(block: Block, word: Word, time: float) -> Hashable:
     return word.kind, word.axes.tobytes(), word.relation, word.spacing, value, changes
 
 
+def _heights(scene: Scene) -> tuple[float, ...]:
+    """[m] along the normal, in its own axes, of the plane in which each body moves above the origin of its frame."""
+    normal = AXES.index(scene.plane)
+    return tuple(
+        height_of(body.model, body_normal(body, normal), used_interfaces(scene, body)) for body in scene.bodies
+    )
+
+
+def _turned_about(place: Layout, heights: tuple[float, ...]) -> csr_array:
+    """(V, V) velocities from those that turn every body about axes in its own plane, in place of axes through its origin."""
+    T = lil_array((place.v_size, place.v_size))
+    T.setdiag(1.0)
+    for first, k, height in zip(place.iv, place.normals, heights, strict=True):
+        for c in (c for c in range(3) if height and c != k):
+            T[first : first + 3, first + 3 + c] = height * np.cross(np.eye(3)[k], np.eye(3)[c])
+    return T.tocsr()
+
+
 def _looked_at(constraints: Constraints) -> Found:
     scene, place, rng = constraints.scene, constraints.place, np.random.default_rng(0)
     start, v = initial_state(scene, place)
@@ -81,11 +101,12 @@ def _looked_at(constraints: Constraints) -> Found:
     for b, n in enumerate(place.n):
         active[[place.iv[b] + c for c in (*place.active(b), *range(6, 6 + n))]] = True
     inside, outside, left, jacobians = [], [], [], []
+    turned = _turned_about(place, _heights(scene))
     for scale in (0.0, 1e-2, 1e-2):
         step = np.where(active, scale * rng.normal(size=place.v_size), 0.0)
         x, speeds = moved(place, start, step), v + to_global_axes(place, start, 100 * step)
         rows = rows_at(constraints, x, speeds)
-        jacobians.append(rows.J[:, ~active])
+        jacobians.append((rows.J @ turned)[:, ~active])
         inside.append(_largest(rows.J[:, active]))
         outside.append(_largest(jacobians[-1]))
         left.append(np.abs([rows.Phi, rows.nu, rows.gamma]).max(axis=0))

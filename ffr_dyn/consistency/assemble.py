@@ -51,7 +51,7 @@ class Assembled(Brief):
     system   : with independent constraint rows, for the motion
     all_rows : with all of them and a relaxed multiplier matrix, for the reactions; None where no row is redundant
 
-    x, v : positions and velocities (see `Layout`);  notes : what was changed and what is redundant, in words
+    x, v : (X,) positions and (V,) velocities (see `Layout`);  notes : what was changed and what is redundant, in words
     degrees_of_freedom : velocities left free by the constraints, elastic ones included
     redundant : (joint, row) pairs that follow from the other rows
     computed : in the plane or in space, and why, in words

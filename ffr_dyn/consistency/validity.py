@@ -113,8 +113,9 @@ def _enough(count: int, turn: float, share: float) -> int:
 
 
 def parts_needed(scene: Scene, result: Result, angle: float = BENT) -> dict[str, int]:
-    """How many equal parts each flexible body of a scene needs so that none of them turns within itself by more than the
-    angle [rad] or deflects by more than a tenth of its size, by what it does in a result of the scene; 1 where one will do.
+    """The number of equal parts that each flexible body of a scene needs, by what it does in a result; 1 where one will do.
+
+    With so many none of them turns within itself by more than the angle [rad], or deflects by more than a tenth of its size.
 
     0.2 rad within a body means errors of 0.1 % of its deflection, where it has its load matrices; half of that is much for a
     linear body. A result in parts knows better where a body bends: the number may grow once.

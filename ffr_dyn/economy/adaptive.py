@@ -38,7 +38,7 @@ KEPT = ("*.R", "*.p", "*.v", "*.omega_bar", "*.position", "*.velocity", "energy.
 
 @dataclass(frozen=True)
 class Adaptation:
-    """When modes enter and leave.
+    """The thresholds at which modes enter and leave.
 
     enter : share of a tolerance above which a mode that is left out enters [1]
     leave : share [1] below which a mode that is there leaves; well below `enter`, so that it does not come back at once
@@ -92,8 +92,8 @@ def adaptive_forward(
     policy    : numbers of the estimates
 
     The result has the states (of second-order bodies those of their mean-axis form), marker motions and energies of a forward
-    run, and model.coordinates (elastic coordinates of
-    each body), energy.switched (energy that switches have added since the start, negative where they took some away).
+    run. Beside them are model.coordinates, the elastic coordinates of each body, and energy.switched, the energy that
+    switches have added since the start, negative where they took some away.
 
     Raises InputError and ComputationError as `economise`.
 

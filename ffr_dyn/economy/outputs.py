@@ -30,8 +30,8 @@ class Output:
 
     name      : of a component such as "rod.tip.position.y", of a quantity with all its components, or "<body>.stress", the
                 largest von Mises stress on the surface of a body
-    tolerance : largest error at any output time
-    absolute  : whether the tolerance is in the unit of the output, or else a share of its range over the run
+    tolerance : largest error at any output time, a share [1] of the range of the output over the run
+    absolute  : the tolerance is in the unit of the output instead
 
     Raises InputError for a tolerance that is not positive.
 

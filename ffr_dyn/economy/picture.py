@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ffr_dyn.analyses.forward import Forward
 from ffr_dyn.chart.diagram import Diagram, Point, spread
 from ffr_dyn.chart.draw import draw_chart
 from ffr_dyn.chart.reference import Reference
@@ -53,6 +54,8 @@ class OutputMeasure:
 
 def diagram(found: Economy) -> Diagram:
     """The runs of a search with their processor times, which takes some repetitions of each, and their errors.
+
+    Raises ComputationError where a run of the search cannot be repeated.
 
     >>> fd.draw_chart(fd.diagram(found), "search.png")
     """
@@ -102,7 +105,8 @@ def _variant(found: Economy, choice: Choice, words: str) -> Variant:
 
 def _point(found: Economy, choice: Choice, words: str, error: Array) -> Point:
     settings, variant = found.settings, _variant(found, choice, words)
-    span = Span(settings.start, settings.end, settings.output_step, settings.stabilisation)
+    begin = settings.analysis.begin if isinstance(settings.analysis, Forward) else "as-given"
+    span = Span(settings.start, settings.end, settings.output_step, settings.stabilisation, begin)
     wall, cpu, evaluations = _timed(make(found.original, choice, span), choice, span, found.policy.timing_repeats)
     errors = {output.name: float(e) for output, e in zip(found.probe.outputs, error, strict=True)}
     kind = TOLERANCE if choice.controlled else STEP

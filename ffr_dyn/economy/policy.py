@@ -103,13 +103,13 @@ class Policy:
     )
     coarse_tolerance: float = number(5e-3, "of the range", "from here up a model in two stages is tried first", SET)
     two_stages: float = number(
-        0.75, "tolerance", "two stages as near the full model in four are believed, step and all", SET
+        0.75, "tolerance", "two stages as near the full model in four are trusted, with their steps", SET
     )
     two_stages_ringing: float = number(
         0.5, "tolerance", "the same where something vibrates undamped: the full model errs by its step as well", SET
     )
     two_stages_reach: float = number(
-        2.5, "of what is believed", "a run of two stages with more modes is worth it below", SET
+        2.5, "of what is trusted", "a run of two stages with more modes is worth it below", SET
     )
 
     # ---- method and step
@@ -117,7 +117,7 @@ class Policy:
         0.95, "tolerance", "methods of two orders that differ by less: their difference is the error of the lower", SET
     )
     agreement_ringing: float = number(0.5, "tolerance", "the same where something vibrates undamped", SET)
-    wide_step_share: float = number(0.8, "tolerance", "an error told by steps over two rows is believed up to", SET)
+    wide_step_share: float = number(0.8, "tolerance", "an error told by steps over two rows is trusted up to", SET)
     hopeless: float = number(8.0, "tolerance", "between two stages and four: neither will do with this step", SET)
     far_below: float = number(0.1, "tolerance", "below it a longer or cheaper step is tried", SET)
     accuracies: tuple[float, float] = number(

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ffr_dyn.analyses.forward import Beginning, begun
 from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.consistency.assemble import Assembled, assemble
 from ffr_dyn.economy.cost import of_evaluations, of_run
@@ -27,12 +28,13 @@ STATES = ("*.R", "*.p", "*.v", "*.omega_bar", "*.q", "*.q_dot")
 
 @dataclass(frozen=True)
 class Span:
-    """From `start` to `end` [s] with a row every `output_step` [s], and how drift is held."""
+    """From `start` to `end` [s] with a row every `output_step` [s]; how drift is held, and in what state a run begins."""
 
     start: float
     end: float
     output_step: float
     stabilisation: Stabilisation = Projection()  # noqa: RUF009 - frozen
+    begin: Beginning = "as-given"
 
     @property
     def rows(self) -> int:
@@ -42,7 +44,7 @@ class Span:
 
 @dataclass(frozen=True, repr=False)
 class Made(Brief):
-    """A model: the scene with it, and that scene assembled at the start of the run."""
+    """A model: the scene with it, and that scene assembled, in the state in which the run begins."""
 
     scene: Scene
     assembled: Assembled
@@ -71,7 +73,7 @@ class Trial(Brief):
 def make(scene: Scene, choice: Choice, span: Span) -> Made:
     """The model of a scene, assembled."""
     applied_to = applied(scene, choice)
-    return Made(applied_to, assemble(applied_to, time=span.start))
+    return Made(applied_to, begun(assemble(applied_to, time=span.start), span.start, span.begin))
 
 
 def cost(trial: Trial, span: Span, model: CostModel = DEFAULT.cost) -> float:

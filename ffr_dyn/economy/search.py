@@ -23,7 +23,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ffr_dyn.analyses.events import Event
-from ffr_dyn.analyses.forward import Forward, forward
+from ffr_dyn.analyses.forward import Beginning, Forward, forward
 from ffr_dyn.analyses.settings import Settings
 from ffr_dyn.consistency.assemble import Assembled, assemble
 from ffr_dyn.economy.cache import Ledger, Tried
@@ -81,6 +81,7 @@ def economise(
     verify: bool | None = None,
     stabilisation: Stabilisation = Projection(),  # noqa: B008 - frozen
     events: Sequence[Event] = (),
+    begin: Beginning = "as-given",
     policy: Policy = DEFAULT,
     tell: Callable[[str], None] = lambda stage: None,
 ) -> Economy:
@@ -93,6 +94,7 @@ def economise(
     tolerance : of outputs without their own: share of the range of the output over the run
     verify    : compare with a run of the full model and a finer step; by default where that takes some seconds only
     events    : moments that the run with the model looks for; where one ends it, the model is one for the rows before
+    begin     : the state in which runs begin, as of `forward`; each model has its own
     policy    : the numbers that all decisions rest on
     tell      : called with the name of each stage
 
@@ -101,7 +103,7 @@ def economise(
 
     >>> found = fd.economise(scene, ["rod.tip.position"], end=0.5, output_step=1e-3, tolerance=1e-3)
     """
-    span, scene = Span(start, end, output_step, stabilisation), with_mean_axis_bodies(scene)
+    span, scene = Span(start, end, output_step, stabilisation, begin), with_mean_axis_bodies(scene)
     tell("assemble")
     assembled = assemble(scene, time=start)
     if any(event.stop for event in events):
@@ -114,7 +116,7 @@ def economise(
     found = None if omitted is None else _surely_rigid(ledger, stiff, omitted)
     found = _beside_everything(ledger, stiff, omitted, verify) if found is None else found
     economy = _finished(ledger, found, verify)
-    return replace(economy, settings=replace(economy.settings, end=end, analysis=Forward(tuple(events))))
+    return replace(economy, settings=replace(economy.settings, end=end, analysis=Forward(tuple(events), begin=begin)))
 
 
 def _ended(scene: Scene, assembled: Assembled, span: Span, events: Sequence[Event]) -> Span:
@@ -126,6 +128,7 @@ def _ended(scene: Scene, assembled: Assembled, span: Span, events: Sequence[Even
         output_step=span.output_step,
         stabilisation=span.stabilisation,
         events=events,
+        begin=span.begin,
         assembled=assembled,
     )
     rows = int((result.time[-1] - span.start) / span.output_step * (1.0 + 1e-12))
@@ -362,7 +365,7 @@ def _settings(span: Span, choice: Choice, of: Probe) -> Settings:
         method=method,
         stabilisation=span.stabilisation,
         outputs=outputs,
-        analysis=Forward(),
+        analysis=Forward(begin=span.begin),
     )
 
 

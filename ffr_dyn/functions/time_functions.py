@@ -43,7 +43,9 @@ class TimeFunction(Brief):
 
 
 def constant(value: float) -> TimeFunction:
-    """The same value at all times, in the unit of what it is for: a joint's angle [rad], a component of a force [N].
+    """The same `value` at all times, in the unit of what it is for: a joint's angle [rad], a component of a force [N].
+
+    Raises InputError for a number that is not finite.
 
     >>> speed = fd.constant(150.0)
     """
@@ -52,6 +54,10 @@ def constant(value: float) -> TimeFunction:
 
 def polynomial(*coefficients: float) -> TimeFunction:
     """c0 + c1 t + c2 t^2 + ..., t [s]; `polynomial(0, 150)` is a crank that turns at 150 rad/s.
+
+    coefficients : c0 in the unit of what it is for, as [rad], c1 in that per second [rad/s], ...
+
+    Raises InputError for a number that is not finite.
 
     >>> angle = fd.polynomial(0, 150)
     """
@@ -80,7 +86,11 @@ def _by_name(function: Callable[P, TimeFunction]) -> Callable[P, TimeFunction]:
 
 @_by_name
 def harmonic(*, amplitude: float, frequency: float, phase: float = 0.0, mean: float = 0.0) -> TimeFunction:
-    """mean + amplitude sin(2 pi frequency t + phase); frequency [Hz], phase [rad].
+    """mean + amplitude sin(2 pi frequency t + phase).
+
+    amplitude, mean : in the unit of what it is for: a stroke [m], a force [N];  frequency : [Hz];  phase : [rad]
+
+    Raises InputError for a number that is not finite.
 
     >>> shake = fd.harmonic(amplitude=0.01, frequency=5.0)
     """
@@ -88,7 +98,7 @@ def harmonic(*, amplitude: float, frequency: float, phase: float = 0.0, mean: fl
 
 
 def table(times: Array, values: Array) -> TimeFunction:
-    """Not-a-knot cubic spline through (times, values), twice differentiable; holds its end values outside.
+    """Not-a-knot cubic spline through values (T,) at times (T,) [s], twice differentiable; holds its end values outside.
 
     Raises InputError unless there are two or more times, increasing, with as many values,
     that a spline can go through.
@@ -139,7 +149,7 @@ def user(function: Callable[[float], object]) -> TimeFunction:
 
 
 def signal(name: str, value: float = 0.0) -> TimeFunction:
-    """An input of the scene, by name, in the unit of where it stands, such as [N]: it has its initial value until a
+    """An input of the scene, by name: it has its initial `value`, in the unit of where it stands, such as [N], until a
     `ffr_dyn.realtime.stepper.Stepper` sets another.
 
     The same signal may stand in several places. Raises InputError for a name that is no word, or a value not finite.

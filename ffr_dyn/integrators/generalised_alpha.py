@@ -269,10 +269,10 @@ class GeneralisedAlpha:
     """Generalised-alpha: order two, implicit in everything, the constraints on positions exact.
 
     step            : time step [s]
-    spectral_radius : what is left after a step of a mode that the step does not resolve, 0 ... 1; near 1, index 3 is
+    spectral_radius : [1] what is left after a step of a mode that the step does not resolve, 0 ... 1; near 1, index 3 is
                       weakly unstable: reactions oscillate and grow in long runs
     form            : "index 3", or "stabilised" (Gear, Gupta & Leimkuhler): the constraints on velocities exact too
-    tolerance       : of the last correction of the velocities, relative
+    tolerance       : of the last correction of the velocities, relative [1]
     iterations      : Newton corrections that a step may take
     scaled          : judge corrections as motions. Otherwise as accelerations and multipliers, which is how index 3 is lost
                       at small steps: their rounding errors grow as 1/h^2

@@ -185,6 +185,8 @@ class HalfExplicit:
 
     step : time step [s]
 
+    Raises InputError for a step that is not positive.
+
     >>> result = fd.forward(scene, end=1.0, output_step=0.01, method=fd.HalfExplicit(1e-4))
     """
 

@@ -69,6 +69,8 @@ class RK4:
 
     step : time step [s]
 
+    Raises InputError for a step that is not positive.
+
     >>> result = fd.forward(scene, end=1.0, output_step=0.01, method=fd.RK4(1e-4))
     """
 

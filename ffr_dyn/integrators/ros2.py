@@ -105,6 +105,8 @@ class ROS2:
 
     step : time step [s]
 
+    Raises InputError for a step that is not positive.
+
     >>> result = fd.forward(scene, end=1.0, output_step=0.01, method=fd.ROS2(1e-3))
     """
 

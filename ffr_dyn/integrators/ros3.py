@@ -130,6 +130,8 @@ class ROS3:
 
     step : time step [s]
 
+    Raises InputError for a step that is not positive.
+
     >>> result = fd.forward(scene, end=1.0, output_step=0.01, method=fd.ROS3(1e-3))
     """
 

@@ -14,7 +14,7 @@ from ffr_prep.common.errors import InputError
 
 @dataclass(frozen=True)
 class Tolerances:
-    """The error of a step is held below these absolute values, plus `relative` of each coordinate's size.
+    """The error of a step is held below these absolute values, plus `relative` [1] of each coordinate's size.
 
     position : of points [m] and rotations [rad]
     velocity : of points [m/s] and angular velocities [rad/s]
@@ -40,7 +40,9 @@ class Tolerances:
 
 
 def tolerances(relative: float) -> Tolerances:
-    """All tolerances in the proportions of the default ones; relative : that of a step, a share of each quantity's size [1].
+    """All tolerances in the proportions of the default ones; relative : [1] that of a step, a share of each quantity's size.
+
+    Raises InputError for a number that is not positive.
 
     >>> method = fd.AdaptiveROS3(fd.tolerances(1e-5))
     """

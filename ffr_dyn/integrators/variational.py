@@ -348,8 +348,10 @@ class Variational:
     The constraints hold on positions and velocities.
 
     step       : time step [s]
-    tolerance  : of the last correction of the velocities, relative
+    tolerance  : of the last correction of the velocities, relative [1]
     iterations : Newton corrections that a step may take
+
+    Raises InputError for a step or a tolerance that is not positive, and for fewer than two corrections.
 
     >>> result = fd.forward(scene, end=1.0, output_step=0.01, method=fd.Variational(1e-3))
     """

@@ -59,7 +59,7 @@ def animate(
     """A film of the bodies of a result: the viewer, which a notebook shows; written where a path is given.
 
     path     : .html, the viewer as a page of its own; .gif, .mp4 (needs imageio-ffmpeg), pictures only
-    scale    : factor of the drawn deformation at the start; "auto": a round one for deflections of about 5 % of a body
+    scale    : [1] factor of the drawn deformation at the start; "auto": a round one for deflections of about 5 % of a body
     fps      : pictures per second of playing time, of .gif and .mp4; the viewer shows all rows, of a long result 2000
     duration : playing time [s]; by default the simulated time, but at least 3 s and at most 6 s
     camera   : by default chosen from the motion (`ffr_dyn.pictures.film.camera_for`)

@@ -117,6 +117,8 @@ def _errors(result: Result, bodies: Sequence[str]) -> Iterator[tuple[str, tuple[
 def report_lines(report: StressReport) -> Iterator[str]:
     """The report in words.
 
+    Raises InputError for a report of an unknown measure.
+
     >>> print(*fd.report_lines(report), sep="\\n")  # of what `fd.stress_report` returned
     """
     of = measure(report.quantity)

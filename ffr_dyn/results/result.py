@@ -70,9 +70,9 @@ def mode_axis(body: str, n: int) -> Axis:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Quantity(Brief):
-    """A history: values (T, ...) with a unit and one axis for each dimension after time.
+    """A history, with a unit and one axis for each dimension after time.
 
-    unit : in SI symbols, such as "m", "N m", "m/s", "m sqrt(kg)"; "1" for a number
+    values : (T, ...);  unit : in SI symbols, such as "m", "N m", "m/s", "m sqrt(kg)"; "1" for a number
 
     Raises InputError for values whose shape is not that of the axes.
 
@@ -270,6 +270,12 @@ def table(result: Result, names: Iterable[str] | None = None) -> tuple[tuple[str
 
 def write_csv(result: Result, path: str | Path, names: Iterable[str] | None = None) -> Path:
     """Write `table` as comma-separated values (RFC 4180, shortest digits that read back exactly), atomically.
+
+    Raises InputError for unknown names and a path that is a folder or a link, ComputationError where the file cannot be
+    written.
+
+    Raises InputError for unknown names and a path that is a folder or a link, ComputationError where the file cannot be
+    written.
 
     >>> fd.write_csv(result, "tip.csv", ["rod.tip.position"])
     """

@@ -111,6 +111,8 @@ class HotSpot:
 def peaks(result: Result, body: str, quantity: str = "von-mises") -> tuple[Array, Array]:
     """(P,) the value of largest size that the measure takes at each surface point, with its sign, and (P,) its row.
 
+    Raises InputError for an unknown measure, and for a body without stress modes.
+
     >>> values, rows = fd.peaks(result, "rod")
     """
     surface, q, of = stressed_surface(result, body), _coordinates(result, body), measure(quantity)
@@ -215,6 +217,8 @@ def _in_element(beams: BeamForces, element: int, q: Array) -> Array:
 def section_histories(result: Result, body: str, element: int) -> Result:
     """Section forces of an element as named histories: <body>.element_3.middle.force and .moment (first, middle, last).
 
+    Raises InputError for a body without section forces, and for an element that it has not.
+
     >>> fd.plot(fd.section_histories(result, "arm", 0), "*")
     """
     values = section_forces(result, body, element)
@@ -240,6 +244,8 @@ class SectionPeak:
 
 def section_peaks(result: Result, body: str) -> tuple[SectionPeak, ...]:
     """For each section force its value of largest size over elements, their places and time.
+
+    Raises InputError for a body without section forces.
 
     >>> worst = fd.section_peaks(result, "arm")
     """

@@ -22,7 +22,7 @@ class Coupling:
     Raises InputError for a ratio that is zero or not finite.
 
     first, second : joint coordinates, "joint.angle" or "joint.stroke"
-    ratio : of the second to the first, not zero: [-], [m], or [1/m]
+    ratio : of the second to the first, not zero: [1], [m], or [1/m]
     offset : of the second where the first is zero [rad] or [m]
 
     >>> gear = fd.Coupling("gear", "pinion.angle", "wheel.angle", ratio=-20 / 40)

@@ -53,6 +53,8 @@ class StressMeasurement:
 
     The body needs stress modes (`ffr-prep reduce --stress`).
 
+    Raises InputError for a point without three coordinates, and for another `what`.
+
     >>> notch = fd.StressMeasurement("notch", "rod", (0.15, 0, 0.012))
     """
 

@@ -282,10 +282,10 @@ class BodyEntry(Strict):
     omega_bar : angular velocity, body axes [rad/s]
     q : elastic coordinates at the start [m sqrt(kg)]; default: zero
     q_dot : their rates [m sqrt(kg)/s]; default: zero
-    damping : modal damping ratio [-], one for all modes or a list; of a second-order body, of the modes of its mean-axis form
+    damping : modal damping ratio [1], one for all modes or a list; of a second-order body, of the modes of its mean-axis form
     rayleigh : alpha [1/s] and beta [s] of the damping matrix alpha M + beta K
-    loss_factor : of the material [-]: each mode is damped by half of it
-    damping_bands : pairs of frequency [Hz], ascending, and damping ratio [-] of the modes up to there
+    loss_factor : of the material [1]: each mode is damped by half of it
+    damping_bands : pairs of frequency [Hz], ascending, and damping ratio [1] of the modes up to there
     stiffening : true: moves to second order, if the body has load matrices; false: linear
     drop : inertia terms that the equations of motion leave out
     """
@@ -356,7 +356,7 @@ class StabilisationEntry(Strict):
 class TolerancesEntry(Strict):
     """Tolerances of the error of a step: absolute values, plus `relative` of each coordinate's size; see `Tolerances`.
 
-    relative : of each coordinate's size [-]
+    relative : of each coordinate's size [1]
     position : absolute, of points [m] and rotations [rad]
     velocity : absolute, of points [m/s] and angular velocities [rad/s]
     elastic : absolute, of elastic displacements [m]
@@ -394,7 +394,7 @@ class _Integrated(_Span):
 
     method : integrator, by its name: `ffr-dyn methods` lists them
     step : [s] of a method with steps of one length; default: found, so that the accuracy is kept
-    accuracy : relative error that the found step keeps [-]; default: 1e-3
+    accuracy : relative error that the found step keeps [1]; default: 1e-3
     tolerances : of a method that chooses its steps
     settings : of the method, beside its step: {spectral_radius = 0.6}
     stabilisation : how constraints are kept

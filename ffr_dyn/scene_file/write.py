@@ -43,6 +43,9 @@ _BARE = set("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-")
 def save_scene(scene: Scene, settings: Settings | MomentSettings, path: str | Path) -> Path:
     """Write a scene file, and beside it a body file <file>.<body>.ffr for every flexible body.
 
+    Raises InputError for a Python function in the scene, which a file cannot hold, ComputationError where the file
+    cannot be written.
+
     >>> fd.save_scene(scene, settings, "scene.toml")
     """
     path = Path(path)

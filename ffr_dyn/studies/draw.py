@@ -12,10 +12,12 @@ from ffr_dyn.studies.measures import TIME
 from ffr_dyn.studies.table import Table
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
+from ffr_prep.common.units import bracketed, pretty
 
 LEVELS = 20
 LIKELY = 1.96  # standard errors of a mean that hold it with 95 % probability
 MANY = 10.0  # histories, beyond which they are drawn fainter
+TICKS = 5  # of an axis, at most: numbers such as 0.0075 need their place
 FEW = 12  # values of a parameter, up to which they are thought to be chosen, and drawn as lines
 
 
@@ -48,23 +50,25 @@ def plot_study(table: Table, folder: str | Path, outputs: Sequence[str] = ()) ->
 
 def _drawn(table: Table, names: list[str], varied: dict[str, Array], folder: Path) -> Iterator[Path]:
     numbers = [name for name in names if table.outputs[name].ndim == 1]
+    label = {name: bracketed(name, pretty(table.units.get(name, ""))) for name in (*varied, *table.outputs)}
+    varied = {label[name]: values for name, values in varied.items()}
     for name in names:
         if name not in numbers and name != TIME:
-            yield _histories(folder / f"{name}.png", name, table.outputs[TIME], table.outputs[name])
+            yield _histories(folder / f"{name}.png", label[name], table.outputs[TIME], table.outputs[name])
     for name in numbers:
         done = np.isfinite(table.outputs[name])
         y, x = table.outputs[name][done], {key: values[done] for key, values in varied.items()}
         if y.size < 2:
             continue
         changes, share = tornado(x, y)
-        yield _over_parameters(folder / f"{name}.png", name, x, y)
-        yield _tornado(folder / f"{name}-tornado.png", name, changes, share)
-        yield _mean(folder / f"{name}-mean.png", name, table.outputs[name])
+        yield _over_parameters(folder / f"{name}.png", label[name], x, y)
+        yield _tornado(folder / f"{name}-tornado.png", label[name], changes, share)
+        yield _mean(folder / f"{name}-mean.png", label[name], table.outputs[name])
         if len(x) > 1:
             first, second = sorted(changes, key=lambda key: -abs(changes[key]))[:2]
             if _spans(x[first], x[second]):
-                yield _surface(folder / f"{name}-surface.png", name, (first, x[first]), (second, x[second]), y)
-    yield _pairs(folder / "pairs.png", {**varied, **{name: table.outputs[name] for name in numbers}})
+                yield _surface(folder / f"{name}-surface.png", label[name], (first, x[first]), (second, x[second]), y)
+    yield _pairs(folder / "pairs.png", {**varied, **{label[name]: table.outputs[name] for name in numbers}})
 
 
 def _numbers(table: Table) -> dict[str, Array]:
@@ -123,6 +127,7 @@ def _over_parameters(path: Path, name: str, x: dict[str, Array], y: Array) -> Pa
             else:
                 axes.plot(values, y, ".", color=PALETTE[0], markersize=3)
             axes.set_xlabel(key)
+            axes.locator_params(axis="x", nbins=TICKS)
         figure.supylabel(name)
     return path
 
@@ -150,6 +155,7 @@ def _surface(path: Path, name: str, first: tuple[str, Array], second: tuple[str,
         figure.colorbar(filled, ax=axes, label=name)
         axes.plot(at[:, 0], at[:, 1], "k.", markersize=2)
         axes.set(xlabel=first[0], ylabel=second[0])
+        axes.locator_params(nbins=TICKS)
     return path
 
 

@@ -94,6 +94,12 @@ def values(outputs: tuple[Measured, ...], result: Result, parameters: Mapping[st
     return {one.name: found[one.name] for one in outputs} | times
 
 
+def units(outputs: tuple[Measured, ...], result: Result) -> dict[str, str]:
+    """Those of outputs that are of a quantity, by name: the unit of the quantity."""
+    found = {one.name: one.quantity for one in outputs if one.how not in ("=", ATTRIBUTE)}
+    return {name: result.quantity(quantity).unit for name, quantity in found.items()}
+
+
 def _value(one: Measured, result: Result) -> Number:
     if one.how == ATTRIBUTE:
         return attribute(result.attributes, one.quantity)

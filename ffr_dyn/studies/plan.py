@@ -49,7 +49,7 @@ from ffr_prep.common.brief import Brief, cut
 from ffr_prep.common.entries import places_of
 from ffr_prep.common.errors import InputError
 from ffr_prep.common.reading import read_toml
-from ffr_prep.common.units import split_quantity
+from ffr_prep.common.units import dimension_of, in_words, split_quantity
 
 MAKING = ("reduce", "reduce-structure", "reduce-matrices")
 TAKEN = ("run", "row", "time", "message")  # columns that every table may have
@@ -263,6 +263,13 @@ def _range(name: str, given: Mapping[str, Any]) -> Axis:
         return spaced(float(start), float(end), count, logarithmic=spacing == "log")
     except (InputError, OverflowError) as error:
         raise InputError(f"parameters.{name}: {error}") from None
+
+
+def units_of(made: Study) -> dict[str, str]:
+    """The SI unit of those parameters whose value the scene writes with a unit."""
+    own = flattened(read_source(made.scene).tree.get("parameters", {}))
+    found = {name: split_quantity(str(own[name])) for name in made.parameters if name in own}
+    return {name: in_words(dimension_of(given[1])) for name, given in found.items() if given}
 
 
 # ---- what fits the scene --------------------------------------------------------------------------------------------

@@ -12,7 +12,7 @@ import io
 import re
 import shlex
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from importlib import import_module
 from pathlib import Path
@@ -21,7 +21,7 @@ from ffr_dyn.analyses.forward import Forward
 from ffr_dyn.analyses.run import run
 from ffr_dyn.analyses.settings import MomentSettings, Settings
 from ffr_dyn.scene_file.read import load_scene
-from ffr_dyn.studies.measures import ERROR, Measured, Number, values, wanted
+from ffr_dyn.studies.measures import ERROR, Measured, Number, units, values, wanted
 from ffr_prep.body import BodyError, FlexibleBody, load_body
 from ffr_prep.common.errors import ComputationError, InputError
 
@@ -55,11 +55,12 @@ class Task:
 
 @dataclass(frozen=True)
 class Row:
-    """The outcome of a run: its numbers and histories, or why there are none."""
+    """The outcome of a run: its numbers and histories with their units, or why there are none."""
 
     number: int
     values: Mapping[str, Number]
     message: str = ""
+    units: Mapping[str, str] = field(default_factory=dict)
 
 
 def perform(task: Task) -> list[Row]:
@@ -76,7 +77,8 @@ def _row(task: Task, point: Point) -> Row:
         scene, settings = load_scene(task.scene, point.of_scene, bodies)
         path = f"{task.histories}/run-{point.number:06d}.nc" if task.histories else None
         result = run(scene, _kept(settings, task.outputs, bool(path)), path=path)
-        return Row(point.number, values(task.outputs, result, point.parameters))
+        found = values(task.outputs, result, point.parameters)
+        return Row(point.number, found, units=units(task.outputs, result))
     except (InputError, BodyError, ComputationError) as error:
         return Row(point.number, {}, " ".join(str(error).split()))
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Mapping, Set
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Self
 
@@ -19,7 +19,7 @@ import h5py
 import numpy as np
 
 from ffr_dyn.studies.measures import HISTORY, TIME, Number
-from ffr_dyn.studies.plan import Study, mark
+from ffr_dyn.studies.plan import Study, mark, units_of
 from ffr_dyn.studies.runs import Row
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.brief import Brief, Rows
@@ -42,6 +42,7 @@ class Table(Brief):
     outputs    : by name (N,), NaN for runs that failed or were not done; of histories (N, T), NaN beyond the last row of a
                  run, with "time" [s] (N, T)
     messages   : why a run has failed; empty for the others
+    units      : of outputs that are of a quantity of the runs; of parameters whose value the scene writes with a unit, in SI
 
     >>> table = fd.load_table("study.nc")
     >>> table.outputs["tip"]
@@ -50,6 +51,7 @@ class Table(Brief):
     parameters: Mapping[str, Any]
     outputs: Mapping[str, Array]
     messages: tuple[str, ...]
+    units: Mapping[str, str] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.messages)
@@ -87,13 +89,14 @@ def table(study: Study, rows: Mapping[int, Row]) -> Table:
         check_memory(3 * 8.0 * count * longest * (len(whole) + 1), f"histories of {count} runs", remedy)
     outputs = {one.name: np.full((count, longest) if one.name in whole else count, np.nan) for one in study.outputs}
     outputs |= {TIME: np.full((count, longest), np.nan)} if whole else {}
-    messages = [""] * count
+    messages, units = [""] * count, units_of(study) | ({TIME: "s"} if whole else {})
     for number, row in rows.items():
         messages[number] = row.message
+        units.update(row.units)
         for name, value in row.values.items():
             outputs[name][number, ...] = _padded(value, longest) if isinstance(value, list) else value
     columns = {name: [point[name] for point in study.points] for name in study.parameters}
-    return Table({name: _column(values) for name, values in columns.items()}, outputs, tuple(messages))
+    return Table({name: _column(values) for name, values in columns.items()}, outputs, tuple(messages), units)
 
 
 def _padded(values: list[float], count: int) -> list[float]:
@@ -155,7 +158,8 @@ class Journal:
         """Rows that are done, on the disk when this returns. Raises OSError where they cannot be kept."""
         for row in rows:
             self.rows[row.number] = row
-            self._write({"run": row.number, "values": dict(row.values), "message": row.message}, flush=False)
+            entry = {"run": row.number, "values": dict(row.values), "message": row.message, "units": dict(row.units)}
+            self._write(entry, flush=False)
         self._flush()
 
     def _write(self, entry: Mapping[str, Any], flush: bool = True) -> None:
@@ -179,7 +183,9 @@ def _row(entry: Mapping[str, Any], runs: int, outputs: Set[str]) -> Row:
     number, values = int(entry["run"]), {str(name): _number(value) for name, value in entry["values"].items()}
     if not (0 <= number < runs and values.keys() <= outputs | {TIME}):
         raise ValueError(number)
-    return Row(number, values, str(entry["message"]))
+    return Row(
+        number, values, str(entry["message"]), {name: str(unit) for name, unit in entry.get("units", {}).items()}
+    )
 
 
 def _number(value: Any) -> Number:
@@ -204,6 +210,8 @@ def save_table(made: Table, path: str | Path) -> None:
                 data.attrs["coordinates"] = " ".join(made.parameters)
             else:
                 data.attrs["parameter"] = 1
+            if name in made.units:
+                data.attrs["units"] = made.units[name]
 
 
 def _variable(file: h5py.File, name: str, values: Any) -> h5py.Dataset:
@@ -234,7 +242,8 @@ def _read(path: Path) -> Table:
         found = {name: _values(data) for name, data in file.items() if name not in (RUN, ROW, MESSAGE)}
         parameters = {name: values for name, values in found.items() if "parameter" in file[name].attrs}
         outputs = {name: values for name, values in found.items() if name not in parameters}
-        return Table(parameters, outputs, tuple(_values(file[MESSAGE])))
+        units = {name: str(file[name].attrs["units"]) for name in found if "units" in file[name].attrs}
+        return Table(parameters, outputs, tuple(_values(file[MESSAGE])), units)
 
 
 def _values(data: h5py.Dataset) -> Any:

@@ -30,6 +30,44 @@ def size_of(body: FlexibleBody) -> float:
     return math.sqrt((xx + yy + zz) / body.mass)
 
 
+def height_of(model: FlexibleBody, k: int, used: tuple[str, ...]) -> float:
+    """[m] along its axis k: where the plane lies about which a body is symmetric, if it is about any.
+
+    That of its centre of mass, exactly through the origin, or through a place that is used, where only a hair is missing.
+    """
+    centre, near = float(model.centre_of_mass[k]), BESIDE * size_of(model)
+    places = [0.0, *(float(i.position[k]) for i in model.interfaces if i.name in used)]
+    return next((place for place in places if abs(place - centre) <= near), centre)
+
+
+def about_height(model: FlexibleBody, k: int, height: float) -> FlexibleBody:
+    """Inertia, places and matrices of rates of a body from an origin that lies higher along its axis k, to judge it by."""
+    if not height:
+        return model
+    up, K = height * np.eye(3)[k], model.stiffening
+    first = np.outer(up, model.r_dm)
+    rr_dm = model.rr_dm - first - first.T + model.mass * np.outer(up, up)
+    rP_dm = model.rP_dm - up[:, None, None] * model.P_dm
+    interfaces = tuple(replace(i, position=i.position - up) for i in model.interfaces)
+    made = replace(model, r_dm=model.r_dm - model.mass * up, rr_dm=rr_dm, rP_dm=rP_dm, interfaces=interfaces)
+    return made if K is None else replace(made, stiffening=_from_above(K, k, height))
+
+
+PRODUCTS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))  # of rates, as load matrices have them
+
+
+def _from_above(stiffening: Array, k: int, height: float) -> Array:
+    """Load matrices of rates about the higher origin: it is accelerated by them, along the axis by -height (w_c)^2, along c
+    by height w_c w_k."""
+    K = np.array(stiffening)
+    for number, (c, d) in enumerate(PRODUCTS, start=6):
+        if c == d != k:
+            K[number] += height * K[k]
+        elif c != d and k in (c, d):
+            K[number] -= height * K[c + d - k]
+    return K
+
+
 def levelled(scene: Scene, normal: int) -> Scene:
     """The scene with places that are used in the middle plane of their body, and bodies at one height, where only a hair is
     missing; itself where nothing is."""
@@ -69,11 +107,11 @@ def _flat(scene: Scene, body: Body, k: int, normal: int, height: float) -> Body:
 
 def _without_hairs(model: FlexibleBody, k: int, used: tuple[str, ...]) -> FlexibleBody:
     """The body with used places that are next to its middle plane in it."""
-    near = BESIDE * size_of(model)
-    hair = tuple(i.name for i in model.interfaces if i.name in used and 0 < abs(i.position[k]) <= near)
+    near, height = BESIDE * size_of(model), height_of(model, k, used)
+    hair = tuple(i.name for i in model.interfaces if i.name in used and 0 < abs(i.position[k] - height) <= near)
 
     def make() -> FlexibleBody:
-        moved = (replace(i, position=_with(i.position, k, 0.0)) if i.name in hair else i for i in model.interfaces)
+        moved = (replace(i, position=_with(i.position, k, height)) if i.name in hair else i for i in model.interfaces)
         return replace(model, interfaces=tuple(moved))
 
     return remembered(model, ("without hairs", k, hair), make) if hair else model

@@ -1,7 +1,7 @@
 """Planar scenes: found or declared, and reduced to what moves in the plane.
 
 A scene is planar about a global axis when its joints hold every body in the plane across that axis and nothing pushes
-against them: every body has a body axis along the normal and is symmetric about the plane through its origin, markers
+against them: every body has a body axis along the normal and is symmetric about a plane across it, markers
 that are used lie in that plane, axes of joints are in the plane or along the normal, and so are forces. Then the in-plane
 motion and all reactions are those of the spatial scene, while a body has three rigid coordinates, no out-of-plane modes,
 and a revolute joint two rows. What a mesh leaves of symmetry and places counts as nothing (`ffr_dyn.variants.aligned`).
@@ -23,7 +23,7 @@ from ffr_dyn.scene.force_kinds import forces_of, in_bases
 from ffr_dyn.scene.forces.places import LEVEL, OnJoint
 from ffr_dyn.scene.own_frame import OwnFrame
 from ffr_dyn.scene.scene import Body, Scene, altered, body_normal, marker_number, undeformed, used_interfaces
-from ffr_dyn.variants.aligned import BESIDE, basis_in_plane, combined, levelled, size_of
+from ffr_dyn.variants.aligned import BESIDE, about_height, basis_in_plane, combined, height_of, levelled, size_of
 from ffr_dyn.variants.variant import with_basis, with_modes
 from ffr_prep.body import FlexibleBody, FrameMarker, Interface, axial, remembered
 from ffr_prep.common.arrays import Array
@@ -84,7 +84,7 @@ def _check_declared(scene: Scene, normal: int) -> None:
 
 def _left_out(body: Body, k: int, used: Sequence[str]) -> tuple[float, str]:
     V = basis_in_plane(body, k)
-    return _most_mixed(body.model if V is None else with_basis(body.model, V), k, used)
+    return _most_mixed(_judged(body.model if V is None else with_basis(body.model, V), k, used), k, used)
 
 
 def obstacles(scene: Scene) -> tuple[str, tuple[str, ...]]:
@@ -124,7 +124,7 @@ def _form_in_plane(
     """The frame that it is the form of, the model and its frame; the basis of double modes; the modes that stay."""
     V = basis_in_plane(body, k)
     turned = body if V is None else combined(body, V)
-    keep = np.flatnonzero(_mostly(turned.model, k, used))
+    keep = np.flatnonzero(_mostly(_judged(turned.model, k, used), k, used))
     reduced = with_modes(turned, keep.tolist())
     frame = reduced.frame and _flat_frame(reduced.frame, k)
     return (body.frame, _flat(reduced.model, k, used), frame), V, keep
@@ -194,6 +194,11 @@ def _leaving(scene: Scene, normal: int) -> Iterator[str]:
 # ---- symmetry of a body -------------------------------------------------------------------------------------------
 
 
+def _judged(model: FlexibleBody, k: int, used: Sequence[str]) -> FlexibleBody:
+    """A body from an origin in the plane across its axis k about which it may be symmetric."""
+    return about_height(model, k, height_of(model, k, tuple(used)))
+
+
 def _asymmetry(part: Body, k: int, used: tuple[str, ...]) -> str:
     """The in-plane motion that excites something across body axis k, rigid or elastic, in words; "" of a symmetric body."""
     key = "asymmetry", k, used, part.stiffening, _ratios(part) if part.model.n else b""
@@ -202,11 +207,11 @@ def _asymmetry(part: Body, k: int, used: tuple[str, ...]) -> str:
 
 def _found_asymmetry(part: Body, k: int, used: tuple[str, ...]) -> str:
     V = basis_in_plane(part, k)
-    body, length = part.model if V is None else with_basis(part.model, V), size_of(part.model)
+    body, length = _judged(part.model if V is None else with_basis(part.model, V), k, used), size_of(part.model)
     places = {"its centre of mass": body.centre_of_mass[k]} | {name: body.interface(name).position[k] for name in used}
     off = max(places, key=lambda name: abs(places[name]))
     if abs(places[off]) > BESIDE * length:
-        return f"{off} is {abs(places[off]):.3g} m off the plane through the origin of its frame"
+        return f"{off} is {abs(places[off]):.3g} m off the plane through its centre of mass"
     products = max(abs(body.rr_dm[k, c]) for c in range(3) if c != k) / (body.mass * length**2)
     if products > BESIDE:
         return f"a product of inertia is {products:.2g} of its moments"
@@ -319,7 +324,7 @@ def _sizes(body: FlexibleBody, used: Sequence[str]) -> Array:
 
 
 def _flat(body: FlexibleBody, k: int, used: Sequence[str]) -> FlexibleBody:
-    """The body with zeros for what in-plane modes do across the plane, which of a symmetric body is rounding.
+    """The body without what in-plane modes do across its plane, which of a symmetric body is rounding.
 
     Rows of joints across the plane then vanish exactly, however large the modes are.
     """
@@ -330,6 +335,7 @@ def _flat(body: FlexibleBody, k: int, used: Sequence[str]) -> FlexibleBody:
     P_dm[k] = 0.0
     for part in (rP_dm, PP_dm):
         part[[a, b, k, k], [k, k, a, b]] = 0.0
+    rP_dm[k, [a, b]] = height_of(body, k, tuple(used)) * P_dm[[a, b]]
     interfaces = tuple(_flat_marker(i, k) if i.name in used else i for i in body.interfaces)
     stiffening = None if body.stiffening is None else _matrices_in_plane(body.stiffening, _first_loads(body, used), k)
     return replace(body, P_dm=P_dm, rP_dm=rP_dm, PP_dm=PP_dm, interfaces=interfaces, stiffening=stiffening)

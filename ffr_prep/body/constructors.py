@@ -86,7 +86,7 @@ def check_point(what: str, name: str, at: ArrayLike) -> None:
 
 
 def truncated(body: FlexibleBody, modes: int | Array) -> FlexibleBody:
-    """The body with only its first ``modes`` elastic coordinates, or those whose indices are listed; so are its parts.
+    """The body with only its first ``modes`` elastic coordinates, or those of the indices (k,) in `modes`; so are its parts.
 
     Raises BodyError for a mode that does not exist or is listed twice.
 

@@ -23,10 +23,10 @@ class Damping:
     """Damping that a body gets beside what it has, of the modes under its reference conditions.
 
     alpha, beta : Rayleigh's damping alpha M + beta K [1/s], [s]
-    loss_factor : [-], of the viscous damping that loses as much as a loss factor of the material at each mode's frequency
+    loss_factor : [1], of the viscous damping that loses as much as a loss factor of the material at each mode's frequency
     bands       : (b, 2) pairs of frequency [Hz] and damping ratio, ascending: each ratio is that of the modes up to its
                   frequency, the last one also of all beyond
-    ratios      : damping ratios of the modes by rising frequency, the last one also of all others
+    ratios      : damping ratios [1] of the modes by rising frequency, the last one also of all others
 
     Raises BodyError for negative or infinite values and for bands that do not ascend.
 
@@ -58,7 +58,7 @@ def damped(
     bands: Sequence[tuple[float, float]] = (),
     ratios: Sequence[float] = (),
 ) -> FlexibleBody:
-    """The body with more damping, as `Damping` has it, beside what it has; so are its parts.
+    """The body with more damping beside what it has; so are its parts. The arguments are as of `Damping`.
 
     Raises BodyError for negative or infinite values and for bands that do not ascend.
 

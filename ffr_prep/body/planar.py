@@ -52,7 +52,7 @@ def in_plane(body: FlexibleBody, normal: Sequence[float] = (0.0, 0.0, 1.0)) -> F
 
 
 def _across(body: FlexibleBody, normal: Array) -> Array:
-    """(n, n) how much the elastic coordinates move out of the plane: inside, at the surface and at the interfaces [-].
+    """(n, n) how much the elastic coordinates move out of the plane: inside, at the surface and at the interfaces [1].
 
     Mean squares of displacements along the normal times the mass, and of rotations of interfaces about axes in the plane.
     """

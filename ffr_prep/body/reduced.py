@@ -36,6 +36,8 @@ class Interface(Brief):
     phi_r    : (3, n) [rad/(m sqrt(kg))], infinitesimal rotation of the node per elastic coordinate
     kind     : "rigid" (RBE2), "mean" (RBE3) or "node"
 
+    Raises BodyError for arrays of other shapes, and values that are not finite.
+
     >>> tip = body.interface("tip")
     """
 
@@ -63,7 +65,7 @@ class QuadraticField(Brief):
     """A field that is quadratic in the elastic coordinates, of rank r:  sum_r shapes_r (q . weights_r q) / 2.
 
     shapes  : (..., r) at every place and component, in its unit divided by m^2 kg
-    weights : (r, n, n) symmetric [-]
+    weights : (r, n, n) symmetric [1]
     """
 
     shapes: Array
@@ -85,6 +87,8 @@ class BeamForces(Brief):
                 last end exerts on the other, in element axes [N/(m sqrt(kg)), N/sqrt(kg)]
     second    : what is quadratic in the elastic coordinates of the same forces, in axes that turn with the sections; None
                 where it was not computed
+
+    Raises BodyError for arrays of other shapes, and values that are not finite.
 
     >>> body.surface.beams  # of a frame reduced with stress=True
     """
@@ -160,13 +164,13 @@ class FlexibleBody(Brief):
     rr_dm     : (3, 3) integral of u_0k u_0l dm [kg m^2]
     P_dm      : (3, n) integral of Phi dm [sqrt(kg)]
     rP_dm     : (3, 3, n) integral of u_0k phi_l,j dm at [k, l, j] [m sqrt(kg)]
-    PP_dm     : (3, 3, n, n) integral of phi_k,i phi_l,j dm at [k, l, i, j] [-]
+    PP_dm     : (3, 3, n, n) integral of phi_k,i phi_l,j dm at [k, l, i, j] [1]
     omega2    : (n,) squared circular frequencies of the reduced body under its reference conditions [rad^2/s^2]
     interfaces, surface : where to attach, what to draw
-    stiffening: (12 + 6 I, n, n) geometric stiffness [1/s^2] per unit of: the acceleration of the body frame less gravity
-        (3) [m/s^2], its angular acceleration (3) [rad/s^2], the products xx, yy, zz, xy, xz, yz of its angular velocity
-        (6) [rad^2/s^2], and for each of the I interfaces force (3) [N] and semitangential moment (3)
-        [N m]; all in body axes. None where it was not computed
+    stiffening: (12 + 6 I, n, n) geometric stiffness [1/s^2] per unit of 12 + 6 I loads, in body axes. The first twelve: the
+        acceleration of the body frame less gravity (3) [m/s^2], its angular acceleration (3) [rad/s^2], the products xx, yy,
+        zz, xy, xz, yz of its angular velocity (6) [rad^2/s^2]. Then for each of the I interfaces force (3) [N] and
+        semitangential moment (3) [N m]. None where it was not computed
     damping   : (n, n) symmetric damping matrix of the elastic coordinates [1/s], beside the ratios that a scene gives: from a
         finite-element model, a file, or `damped`. None where there is none
     parts     : bodies that the body is cut into, one after the other, if it is: each in the same frame, undeformed, with the
@@ -308,12 +312,12 @@ class FlexibleBody(Brief):
 
     @property
     def I5(self) -> Array:
-        """(3, n, n) integral of phi_i x phi_j dm at [:, i, j] [-]. Equation (7) of docs/notation.md."""
+        """(3, n, n) integral of phi_i x phi_j dm at [:, i, j] [1]. Equation (7) of docs/notation.md."""
         return axial(self.PP_dm)
 
     @property
     def I6(self) -> Array:
-        """(n, n) integral of Phi^T Phi dm [-]; the identity, since the basis is mass-orthonormal."""
+        """(n, n) integral of Phi^T Phi dm [1]; the identity, since the basis is mass-orthonormal."""
         return np.einsum("kkij->ij", self.PP_dm)
 
     @property
@@ -329,7 +333,7 @@ class FlexibleBody(Brief):
 
     @property
     def I9(self) -> Array:
-        """(n, n, 3, 3) integral of phi_i~ phi_j~ dm at [i, j] [-]. Equation (9) of docs/notation.md."""
+        """(n, n, 3, 3) integral of phi_i~ phi_j~ dm at [i, j] [1]. Equation (9) of docs/notation.md."""
         trace = np.einsum("kkij->ij", self.PP_dm)
         return np.einsum("klij->ijlk", self.PP_dm) - trace[:, :, None, None] * np.eye(3)
 
@@ -341,16 +345,16 @@ class FlexibleBody(Brief):
         return self.P_dm
 
     def S_bar_kl(self, k: int, l: int) -> Array:  # noqa: E741 - k, l are the book's indices
-        """(n, n) integral of S_k^T S_l dm, with k, l in 0, 1, 2 for x, y, z [-]."""
+        """(n, n) integral of S_k^T S_l dm, with k, l in 0, 1, 2 for x, y, z [1]."""
         return self.PP_dm[k, l]
 
     def N_bar_kl(self, k: int, l: int) -> Array:  # noqa: E741
-        """(n, n) skew part S_bar_kl - S_bar_kl^T [-]."""
+        """(n, n) skew part S_bar_kl - S_bar_kl^T [1]."""
         return self.PP_dm[k, l] - self.PP_dm[k, l].T
 
     @property
     def S_bar_ff(self) -> Array:
-        """(n, n) S_bar_xx + S_bar_yy + S_bar_zz (= I6) [-]."""
+        """(n, n) S_bar_xx + S_bar_yy + S_bar_zz (= I6) [1]."""
         return self.I6
 
 

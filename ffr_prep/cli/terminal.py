@@ -12,6 +12,7 @@ import click
 
 from ffr_prep.common.process_memory import begin_peak, in_words, peak
 
+LONGEST = 3  # steps that are told when all is done; on a terminal each is told as it ends
 _PAUSE = 0.2  # seconds between two looks at how far a step is
 
 
@@ -62,11 +63,14 @@ class Steps:
         self._name = ""
 
     def lines(self) -> Iterable[str]:
-        """Time and memory of all steps."""
-        yield f"time        {', '.join(f'{step.name} {step.seconds:.1f} s' for step in self.ended)}"
-        most = max((step.memory for step in self.ended if step.memory), default=None)
-        parts = ", ".join(f"{step.name} {in_words(step.memory)}" for step in self.ended if step.memory)
-        yield f"memory      {in_words(most)} at most{': ' if parts else ''}{parts}"
+        """Time and memory of the work, with its longest steps and with the one that needed most memory."""
+        total = sum(step.seconds for step in self.ended)
+        longest = sorted(self.ended, key=lambda step: -step.seconds)[:LONGEST]
+        listed = ", ".join(f"{step.name} {step.seconds:.1f} s" for step in longest)
+        yield f"time        {total:.1f} s; the longest steps: {listed}"
+        largest = max(self.ended, key=lambda step: step.memory or 0)
+        where = f" at most ({largest.name})" if largest.memory else ""
+        yield f"memory      {in_words(largest.memory)}{where}"
 
     def _tell(self, text: str) -> None:
         if self.visible:

@@ -23,9 +23,9 @@ def meanings(docstring: str | None) -> dict[str, str]:
 
 
 def prose(docstring: str | None) -> str:
-    """The docstring without its lists and examples."""
+    """The docstring without its lists, errors and examples: for readers who call nothing."""
     said = (block for block in blocks(docstring) if isinstance(block, str))
-    return "\n\n".join(block for block in said if not block.startswith(">>> "))
+    return "\n\n".join(block for block in said if not block.startswith((">>> ", "Raises ")))
 
 
 def blocks(docstring: str | None) -> list[str | dict[tuple[str, ...], str]]:

@@ -122,8 +122,8 @@ def with_second_moments(
         PP_dm, misfit = _at_nodes(content, axes)
         K[PRODUCTS] = symmetric.transpose(2, 0, 1) - centrifugal(PP_dm)
         warning = (
-            f"geometric stiffness in Oe.m1 ({identity}): its sum with mass is kept, the part of the mass is that of nodal "
-            f"masses, off by {misfit:.1e}"
+            f"Oe.m1 holds geometric stiffness beside inertia ({identity}): their sum is kept. The inertia alone is that of "
+            f"masses at the nodes, off by {misfit:.1e}, which changes moments of inertia by squares of the deflection only"
         )
     elif not symmetric.any() and content.M.size:
         PP_dm, misfit = _at_nodes(content, axes)

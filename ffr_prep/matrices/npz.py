@@ -53,6 +53,8 @@ def from_npz(path: Path) -> MatrixModel:
 def save_matrices(model: MatrixModel, path: str | Path) -> Path:
     """Write a model to a .npz file in SI units, atomically.
 
+    Raises InputError for a path that is a folder or a link, ComputationError where the file cannot be written.
+
     >>> fp.save_matrices(model, "part.npz")
     """
     path = Path(path)

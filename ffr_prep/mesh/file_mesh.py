@@ -62,7 +62,7 @@ class FileMesh:
 
     points  : (N, 3)
     blocks  : volume elements by kind, (kind, nodes (E, k)), in the node order of `ffr_prep.mesh.cells`
-    volumes : name -> element numbers, counted through the blocks
+    volumes : name -> (m,) element numbers, counted through the blocks
     faces   : name -> corners (F, 3) or (F, 4) of faces; the volume elements know the rest of their faces
     nodes   : name -> node indices
     notes   : what was left out or changed, in words

@@ -60,7 +60,7 @@ class Mesh(Brief):
     face_groups   : name -> tuple of (F, k) face connectivities, k = 3, 6 (triangles), 4, 8, 9 (quadrilaterals)
     node_groups   : name -> (m,) node indices
     notes         : what was left out or changed on reading, in words
-    drawn         : of a geometry, each face with its facets as in face_groups
+    drawn         : of a geometry, each face with its facets (F, k) as in face_groups
     unit          : in which the file has its lengths, for texts such as "cylinder r=6 at 0,0,0"
 
     >>> mesh = fp.read_mesh("rod.geo")
@@ -109,11 +109,11 @@ def read_mesh(
                millimetres for IGES, which is converted to them, and metres for every other file. Another unit than a STEP
                or IGES file declares is refused
     size     : largest element edge when geometry is meshed, in the unit of the file [m, cm, mm or in]
-    numbers  : parameters of a .geo script to change, by name, in the unit of the script
+    numbers  : parameters of a .geo script to change, by name, lengths in the unit of the script [m, mm ...]
     order    : 1 or 2, of the elements when geometry is meshed; second-order elements follow curved surfaces
     glue     : solids of a CAD file that touch share the faces between them, and are one body then
     solids   : of a CAD file, the names of those to keep, or patterns such as "volume_1" or "arm*"; all when not given
-    most_elements : a geometry whose size, or whose fine curves, ask for more is refused before it is meshed
+    most_elements : [1] a geometry whose size, or whose fine curves, ask for more is refused before it is meshed
     progress : called with the name of the stage as it begins
 
     A .geo file is a program and may run others: open only what you trust. Faces and volumes of CAD files without
@@ -387,7 +387,7 @@ def _check_jacobians(mesh: Mesh) -> None:
 
 
 def _worst_jacobians(corners: Array, kind: str) -> Array:
-    """(E,) least Jacobian determinant of elements with nodes at (E, k, 3), over the cube of their size [-]."""
+    """(E,) least Jacobian determinant of elements with nodes at (E, k, 3), over the cube of their size [1]."""
     from ffr_prep.mesh.shapes import jacobian_determinants  # here, because scikit-fem is slow to load
 
     worst = np.empty(len(corners))

@@ -36,7 +36,7 @@ _ASYMMETRY = 1e-6  # of a matrix that was typed or printed with six digits
 class Material:
     """An isotropic linear elastic solid.
 
-    E : Young's modulus [Pa]; nu : Poisson's ratio [-]; rho : density [kg/m^3]
+    E : Young's modulus [Pa];  nu : Poisson's ratio [1];  rho : density [kg/m^3]
 
     Raises InputError for values no solid can have: E and rho must be positive, nu between -1 and 0.5.
 
@@ -130,8 +130,8 @@ def orthotropic(
 ) -> AnisotropicMaterial:
     """A material with three planes of symmetry.
 
-    E  : (E1, E2, E3) Young's moduli [Pa]; G : (G12, G13, G23) shear moduli [Pa]
-    nu : (nu12, nu13, nu23), where nu12 is the contraction along 2 under tension along 1, so nu21 = nu12 E2 / E1
+    E  : (E1, E2, E3) Young's moduli [Pa];  G : (G12, G13, G23) shear moduli [Pa];  rho : density [kg/m^3]
+    nu : [1] (nu12, nu13, nu23), where nu12 is the contraction along 2 under tension along 1, so nu21 = nu12 E2 / E1
 
     Raises InputError for constants that no solid can have.
 

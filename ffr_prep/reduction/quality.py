@@ -62,8 +62,8 @@ class Quality:
     receptance_errors: (F,) largest over all pairs of interface coordinates
     points           : names of what is drawn: translation and rotation of the first interfaces
     full, reduced    : (F, points) largest driving-point receptance of each [m/N or rad/(N m)]
-    reference_error  : bound on the error of the receptances taken as those of the full model
-    flexibility_error: largest of the static flexibility of the free body; NaN without interfaces
+    reference_error  : [1] bound on the error of the receptances taken as those of the full model
+    flexibility_error: [1] largest of the static flexibility of the free body; NaN without interfaces
     displacement_errors, stress_errors : (12,) under the unit accelerations; NaN where nothing deforms
 
     >>> fp.quality_of(body.provenance).receptance_errors

@@ -17,7 +17,7 @@ _POINTS = 200
 
 @dataclass(frozen=True)
 class Band:
-    """A range of frequencies [Hz]; InputError unless 0 < low < high.
+    """Frequencies from low [Hz] to high [Hz]; InputError unless 0 < low < high.
 
     >>> request = fp.Request(name="rod", reference=fp.MeanAxis(), reduction=fp.Rubin(8), quality=fp.Band(1.0, 2000.0))
     """

@@ -23,6 +23,8 @@ from ffr_prep.mesh.geometry.regions import query_for
 def face_page(faces: Faces, path: str | Path, title: str = "faces") -> Path:
     """Write the page; returns its path. A click picks a feature, with Alt one face; Shift adds to what is picked.
 
+    Raises InputError for a path that is a folder or a link, ComputationError where the file cannot be written.
+
     >>> fp.face_page(fp.faces("plate.step"), "faces.html")
     """
     path = Path(path)

@@ -48,7 +48,7 @@ class Beams:
     offset       : (E, 3) centroid from the line through the nodes, element axes [m]
     EA, GJ       : (E,) axial [N] and torsional [N m^2] stiffness
     EIy, EIz     : (E,) bending stiffness [N m^2]
-    shear_y, shear_z : (E,) 12 E I / (k G A l^2) of bending in the x'y' and the x'z' plane [-]; 0 with rigid shear
+    shear_y, shear_z : (E,) 12 E I / (k G A l^2) of bending in the x'y' and the x'z' plane [1]; 0 with rigid shear
     line_mass    : (E,) [kg/m]
     gyration     : (E, 2) root mean squares of y and z over the mass of the section [m]
     """

@@ -148,7 +148,7 @@ def _freeze(frame: Frame, key: str, value: Array, shape: tuple[int, ...]) -> Non
 
 
 def polyline(corners: Sequence[Vector] | Array, member: Member, *, elements: int = 1) -> Frame:
-    """Straight beams from corner to corner (P, 3) [m], each of `elements` elements of equal length.
+    """Straight beams through corners (P, 3) [m], each of `elements` elements of equal length.
 
     Raises InputError for fewer than two corners, one that is not finite, or no elements.
 
@@ -221,6 +221,8 @@ def triangulated(frame: Frame) -> Frame:
 def joined(*frames: Frame) -> Frame:
     """One frame of several: nodes at the same place become one, and beams and plates meet there rigidly.
 
+    Raises InputError for coordinates that are not finite.
+
     >>> tower = fp.joined(legs, braces)
     """
     points = np.vstack([frame.points for frame in frames])
@@ -264,7 +266,7 @@ def _merged(points: Array) -> tuple[Array, Array]:
 
 
 def named(frame: Frame, **positions: Vector) -> Frame:
-    """The frame with names for the nodes at these positions [m].
+    """The frame with names for the nodes at these positions (3,) [m].
 
     Raises InputError where there is no node.
 

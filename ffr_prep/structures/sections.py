@@ -32,7 +32,7 @@ class Section:
     A           : area [m^2]
     Iy, Iz      : second moments, integrals of z^2 and of y^2 over the area [m^4]
     J           : torsion constant of Saint-Venant [m^4]; at most Iy + Iz, reached by round sections
-    ky, kz      : shear factors along y' and z' [-]; math.inf makes the beam rigid in shear (Euler-Bernoulli)
+    ky, kz      : shear factors along y' and z' [1]; math.inf makes the beam rigid in shear (Euler-Bernoulli)
     offset      : (y, z) of the centroid from the line through the nodes, in element axes [m]
     mass_moments: the second moments (Iy, Iz) that carry mass [m^4]; (Iy, Iz) when not given, which is the inertia of
                   the whole section: rotary, polar and, of the undeformed body, its extent across the axis
@@ -78,6 +78,8 @@ class Section:
 def rectangle(b: float, h: float) -> Section:
     """Solid rectangle, width b along z', height h along y' [m]; torsion by the series of Timoshenko and Goodier.
 
+    Raises InputError for a width or height that is not positive.
+
     >>> section = fp.rectangle(0.02, 0.04)
     """
     name = f"rectangle {b:g} x {h:g} m"
@@ -90,6 +92,8 @@ def rectangle(b: float, h: float) -> Section:
 
 def circle(d: float) -> Section:
     """Solid circle of diameter d [m].
+
+    Raises InputError for a diameter that is not positive.
 
     >>> section = fp.circle(0.02)
     """
@@ -146,6 +150,8 @@ def general(
     """A section by its constants (see Section); without shear factors it is rigid in shear.
 
     A : area [m^2];  Iy, Iz : second moments [m^4];  J : torsion constant [m^4];  ky, kz : shear factors [1]
+
+    Raises InputError for constants that are not positive, and for J beyond Iy + Iz.
 
     >>> section = fp.general("rail", A=7.7e-3, Iy=3.0e-5, Iz=5.1e-6, J=2.2e-6)
     """

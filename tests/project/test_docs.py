@@ -16,12 +16,15 @@ from places import ROOT
 from synthetic import cloud
 from test_dyn_stress import random_surface
 
+import ffr_dyn as fd
+import ffr_prep as fp
 from ffr_dyn.cli import cli as dyn_cli
 from ffr_dyn.results.file import load_result
 from ffr_dyn.results.quantities import DEFAULT_OUTPUTS
 from ffr_dyn.scene_file.read import load_scene
 from ffr_prep.body import load_body, save_body
 from ffr_prep.cli import cli as prep_cli
+from ffr_prep.common.docstrings import blocks
 
 DOORS = ("ffr_prep", "ffr_dyn")
 ROOMS = ("docs", "docs/tutorials", "docs/howto")
@@ -60,6 +63,54 @@ def test_links_are_called_by_what_they_lead_to(page):
     text = re.sub(r"^```.*?^```", "", (ROOT / page).read_text(encoding="utf-8"), flags=re.S | re.M)
     assert re.findall(r"\[[^\]]*\.md`?\]\([^)]*\)", text) == []
     assert re.findall(r"docs/\w+\.md|[Tt]he site's page", text) == []
+
+
+LONGEST_SENTENCE = 40  # words
+
+
+def paragraphs(text: str) -> list[str]:
+    """Of a page: without programs, tables, comments and formulas that stand alone."""
+    text = re.sub(r"^```.*?^```|<!--.*?-->|\$\$.*?\$\$", "\n\n", text, flags=re.S | re.M)
+    blocks = re.split(r"\n\s*\n|\n(?=[*-] |\d+\. |\||#)", text)
+    return [" ".join(block.split()) for block in blocks if not block.startswith(("    ", "|", ":::"))]
+
+
+def longest_sentence(paragraph: str, ends: str = ".!?…") -> str:
+    """By its words; what stands between backticks is one, and letters and numbers of formulas are none."""
+    text = re.sub(
+        r"\b(al|eq|e\.g|Fig|i\.e|p|pp|vol)\.", r"\1", re.sub(r"\]\([^)]*\)", "]", re.sub(r"`[^`]*`", "code", paragraph))
+    )
+    return max(re.split(rf"[{ends}][*_\"’)\]]*\s+|\s[—–]\s", text), key=words)
+
+
+def words(text: str) -> int:
+    return len(re.findall(r"[^\W\d_]{2,}", text))
+
+
+def test_sentences_are_counted_by_their_words():
+    text = "A `b c` d (see [e](f.md)) is 2 x. Two sentences (e.g. this) are here."
+    assert longest_sentence(text) == "Two sentences (e.g this) are here."
+    assert words("A code [ab] is 2 x") == 3
+
+
+@pytest.mark.parametrize("page", ["README.md", "CONTRIBUTING.md", *WRITTEN])
+def test_sentences_of_pages_are_short(page):
+    found = [longest_sentence(one) for one in paragraphs((ROOT / page).read_text(encoding="utf-8"))]
+    assert [one for one in found if words(one) > LONGEST_SENTENCE] == []
+
+
+@pytest.mark.parametrize("door", [fd, fp], ids=["fd", "fp"])
+def test_sentences_of_docstrings_are_short(door):
+    """Of all public names; in lists a semicolon ends one, too."""
+    texts = [
+        " ".join(text.split())
+        for name in door.__all__
+        for block in blocks(getattr(door, name).__doc__)
+        for text in (block.values() if isinstance(block, dict) else [block])
+        if not text.startswith((">>> ", "    "))
+    ]
+    found = [longest_sentence(text, ends=".!?…;:") for text in texts]
+    assert [one for one in found if words(one) > LONGEST_SENTENCE] == []
 
 
 def anchors(page: Path) -> set[str]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import dataclasses
+import functools
 import inspect
 import re
 import textwrap
@@ -53,50 +54,104 @@ def test_an_example_calls_what_there_is(name):
             inspect.signature(thing).bind(*call.args, **{of.arg: of.value for of in call.keywords if of.arg})
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_errors_that_it_raises_itself_are_named(name):
-    thing = inspect.unwrap(found(name))
-    source = thing if inspect.isfunction(thing) else vars(thing).get("__post_init__")
-    if source is None or inspect.unwrap(source).__name__ == "__create_fn__":
-        return
-    tree = ast.parse(textwrap.dedent(inspect.getsource(inspect.unwrap(source))))
+ERRORS = {"InputError", "ComputationError", "BodyError"}
+
+
+@functools.cache
+def itself(function: Any) -> tuple[set[str], set[Any]]:
+    """The errors that a function raises itself, and the functions and classes of the packages that it calls by name."""
+    tree = ast.parse(textwrap.dedent(inspect.getsource(function)))
     raised = {
-        node.exc.func.id
-        for node in ast.walk(tree)
-        if isinstance(node, ast.Raise) and isinstance(node.exc, ast.Call) and isinstance(node.exc.func, ast.Name)
+        node.exc.func for node in ast.walk(tree) if isinstance(node, ast.Raise) and isinstance(node.exc, ast.Call)
     }
-    assert {
-        word for word in raised & {"InputError", "ComputationError", "BodyError"} if word not in thing.__doc__
-    } == set()
+    named = {node.func.id for node in ast.walk(tree) if isinstance(node, ast.Call) and isinstance(node.func, ast.Name)}
+    things = [inspect.unwrap(function.__globals__[name]) for name in named & function.__globals__.keys()]
+    own = [made(thing) for thing in things if (getattr(thing, "__module__", None) or "").startswith("ffr_")]
+    return {of.id for of in raised if isinstance(of, ast.Name)} & ERRORS, {one for one in own if one is not None}
 
 
-SHAPE, UNIT = re.compile(r"\((?:[\w +*.]+,)+[\w +*.]*\)"), re.compile(r"\[[^\]]+\]")
+def made(thing: Any) -> Any:
+    """The function that runs when a thing is called; None where that has no source."""
+    found = vars(thing).get("__post_init__") if inspect.isclass(thing) else thing
+    found = inspect.unwrap(found) if found is not None else None
+    return found if inspect.isfunction(found) and found.__name__ != "__create_fn__" else None
+
+
+def reached(function: Any) -> set[str]:
+    """The errors of a function and of all that it calls, as far as names lead."""
+    seen, ahead, errors = set(), {function}, set()
+    while ahead:
+        raised, called = itself(one := ahead.pop())
+        seen.add(one)
+        errors |= raised
+        ahead |= called - seen
+    return errors
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_errors_are_told(name):
+    """Those that it raises itself by their names; where all come from what it calls, at least one."""
+    thing = inspect.unwrap(found(name))
+    function = made(thing)
+    if function is None:
+        return
+    told = {word for word in ERRORS if word in thing.__doc__}
+    assert itself(function)[0] <= told
+    assert told or not reached(function)
+
+
+SHAPE, UNIT = re.compile(r"\((?:[\w +*.]+,)+[\w +*.]*\)"), re.compile(r"\[[^]\"'=(]*[A-Za-z1°][^]\"'=]*\]")
 ELSEWHERE = re.compile(r"\b(?:as of|as in|those of) `")  # which says them
-OF_ARRAYS, OF_NUMBERS = re.compile(r"\b(?:Array|Vector)\b|tuple\[float"), re.compile(r"\bfloat\b")
+OF_ARRAYS, OF_NUMBERS = re.compile(r"\bArray\b"), re.compile(r"\bfloat\b")
+A_FUNCTION = re.compile(r"Callable\[\[.*")  # which has numbers of its own
 
 
 def told(thing: Any) -> str:
-    """Docstring, and the help of options."""
-    made = dataclasses.fields(thing) if dataclasses.is_dataclass(thing) else ()
-    return " ".join([thing.__doc__ or "", *(str(dict(field.metadata)) for field in made)])
+    """Docstring without its example, and the help of options."""
+    fields = dataclasses.fields(thing) if dataclasses.is_dataclass(thing) else ()
+    return " ".join([(thing.__doc__ or "").partition(">>>")[0], *(str(dict(of.metadata)) for of in fields)])
 
 
-def annotations(thing: Any) -> str:
-    """Of what it takes and, of a function, returns."""
+def told_of(thing: Any, name: str) -> str:
+    """What is said of an argument: in a list, as an option, and in sentences from its name on."""
+    fields = {of.name: of for of in dataclasses.fields(thing)} if dataclasses.is_dataclass(thing) else {}
+    option = str(dict(fields[name].metadata)) if name in fields else ""
+    sentences = re.findall(rf"\b{re.escape(name)}\b[^.;]*", " ".join((thing.__doc__ or "").partition(">>>")[0].split()))
+    return " ".join([meanings(thing.__doc__).get(name, ""), option, *sentences])
+
+
+def arguments(thing: Any) -> dict[str, str]:
+    """The annotations of what it takes, by name."""
     try:
-        found = inspect.signature(thing)
+        found = inspect.signature(thing).parameters.values()
     except (TypeError, ValueError):
-        return ""
-    taken = [str(of.annotation) for of in found.parameters.values() if not of.name.startswith("_")]
-    return " ; ".join([*taken, *([] if inspect.isclass(thing) else [str(found.return_annotation)])])
+        return {}
+    return {of.name: A_FUNCTION.sub("", str(of.annotation)) for of in found if not of.name.startswith("_")}
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_shapes_of_arrays_and_units_of_numbers_are_told(name):
+def test_shapes_of_arrays_and_units_of_numbers_are_told_of_every_argument(name):
+    """[1] of a number without a unit."""
     thing = found(name)
-    text, given = told(thing), annotations(thing)
-    assert not OF_ARRAYS.search(given) or SHAPE.search(text), "a shape such as (N, 3) is missing"
-    assert not OF_NUMBERS.search(given) or UNIT.search(text) or ELSEWHERE.search(text), "a unit such as [m] is missing"
+    if ELSEWHERE.search(told(thing)):
+        return
+    of = {argument: told_of(thing, argument) for argument in arguments(thing)}
+    assert [
+        word for word, given in arguments(thing).items() if OF_ARRAYS.search(given) and not SHAPE.search(of[word])
+    ] == []
+    assert [
+        word for word, given in arguments(thing).items() if OF_NUMBERS.search(given) and not UNIT.search(of[word])
+    ] == []
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_shape_or_unit_of_what_is_returned_is_told(name):
+    thing = inspect.unwrap(found(name))
+    if not inspect.isfunction(thing):
+        return
+    given, text = str(inspect.signature(thing).return_annotation), told(thing)
+    assert not OF_ARRAYS.search(given) or SHAPE.search(text) or ELSEWHERE.search(text)
+    assert not OF_NUMBERS.search(A_FUNCTION.sub("", given)) or UNIT.search(text) or ELSEWHERE.search(text)
 
 
 # ---- lists in docstrings --------------------------------------------------------------------------------------------
@@ -126,5 +181,5 @@ def test_lists_give_each_name_its_meaning():
 
 
 def test_prose_is_what_is_left():
-    assert prose(SAID) == "A force.\n\nRaises InputError: never."
+    assert prose(SAID) == "A force."
     assert [type(block) for block in blocks(SAID)] == [str, dict, str, str]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import shutil
 import subprocess
 import sys
 import tarfile
@@ -80,6 +81,15 @@ def test_the_recipe_and_the_oldest_versions_are_those_of_the_project():
         assert (version + ".0").startswith(re.findall(r">=([\d.]+)", wanted[name])[0])
 
 
+def test_the_recipe_is_rendered():
+    """By the program that builds it; without a network nothing is looked up."""
+    stage0, variants = (pytest.importorskip(f"rattler_build.{name}") for name in ("stage0", "variant_config"))
+    recipe = stage0.Stage0Recipe.from_file(str(RECIPE))
+    (made,) = recipe.render(variants.VariantConfig({}))
+    package = made.recipe.to_dict()["package"]
+    assert package == {"name": PROJECT["name"], "version": PROJECT["version"]}
+
+
 # ---- slow: from a wheel, outside the checkout -----------------------------------------------------------------------
 
 
@@ -124,13 +134,27 @@ def test_the_distributions_hold_what_they_should(made):
     assert [name for name in inside if name.startswith(("docs/made", "docs/gallery", "build/"))] == []
 
 
-@pytest.fixture(scope="module")
-def bare(made, tmp_path_factory):
+VERSIONS = re.findall(r"Python :: (3\.\d+)", " ".join(PROJECT["classifiers"]))
+OLDEST = f"{VERSIONS[0]} with the oldest libraries"
+
+
+def interpreter(version: str) -> str:
+    """The Python of that version; a skip where it is not here."""
+    for found in (shutil.which(f"python{version}"), sys.executable):
+        asked = [found, "-c", "import ensurepip, sys; print('%d.%d' % sys.version_info[:2])"]
+        if found and subprocess.run(asked, capture_output=True, text=True).stdout.strip() == version:
+            return found
+    pytest.skip(f"no Python {version} here")
+
+
+@pytest.fixture(scope="module", params=[*VERSIONS, OLDEST])
+def bare(request, made, tmp_path_factory):
     """Folder of the programs of an environment with the wheel and what it needs."""
     (wheel,) = made.glob("*.whl")
     folder = tmp_path_factory.mktemp("bare")
-    run(sys.executable, "-m", "venv", folder, cwd=folder)
-    run(folder / "bin" / "python", "-m", "pip", "install", "--quiet", wheel, cwd=folder)
+    oldest = ("-c", ROOT / "constraints-oldest.txt") if request.param == OLDEST else ()
+    run(interpreter(request.param.partition(" ")[0]), "-m", "venv", folder, cwd=folder)
+    run(folder / "bin" / "python", "-m", "pip", "install", "--quiet", *oldest, wheel, cwd=folder)
     return folder / "bin"
 
 

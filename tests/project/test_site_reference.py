@@ -10,6 +10,7 @@ from importlib import import_module
 from typing import Any
 
 import click
+import matplotlib.pyplot as plt
 import pytest
 from places import ROOT
 from pydantic import TypeAdapter
@@ -154,3 +155,22 @@ def test_signatures_are_short_and_types_left_out():
     text = doors._signature(ffr_dyn.forward)
     assert text.startswith("(scene, *, end, output_step, method=None, start=0.0, stabilisation=...")
     assert "Integrator" not in text
+
+
+# ---- pictures -------------------------------------------------------------------------------------------------------
+
+
+def test_axes_of_a_picture_that_say_nothing_are_named(monkeypatch):
+    """But for those that share what is along them with a panel that says it, and colour bars."""
+    pytest.importorskip("sphinx_gallery")
+    monkeypatch.syspath_prepend(str(ROOT / "docs" / "extensions"))
+    films = import_module("films")
+    plt.close("all")
+    figure, (upper, lower) = plt.subplots(2, 1, sharex=True)
+    upper.set_ylabel("force [N]")
+    lower.set_xlabel("time [s]")
+    assert films.unlabelled() == ["the y axis"]
+    lower.set_ylabel("error [N]")
+    figure.colorbar(upper.scatter([0, 1], [0, 1], c=[0, 1]), ax=upper)
+    assert films.unlabelled() == []
+    plt.close("all")

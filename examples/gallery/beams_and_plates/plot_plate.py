@@ -24,6 +24,7 @@ found = np.sqrt(plate.omega2) * a**2 / np.sqrt(steel.E * h**2 / (12 * (1 - steel
 figure, panels = plt.subplots(1, 5, figsize=(12, 3), layout="constrained", sharey=True)
 for k, panel in enumerate(panels):
     panel.tricontourf(*plate.surface.points[:, :2].T, plate.surface.Phi[:, 2, k], levels=21, cmap="RdBu")
-    panel.set(title=f"λ = {found[k]:.2f}, {plate.frequencies[k]:.1f} Hz", aspect="equal")
+    panel.set(title=f"λ = {found[k]:.2f}, {plate.frequencies[k]:.1f} Hz", xlabel="x [m]", aspect="equal")
+panels[0].set_ylabel("y [m]")
 
 assert np.allclose(found, (3.4917, 8.5246, 21.429, 27.331, 31.111), rtol=0.007)

@@ -38,6 +38,7 @@ def exact(k):
 
 k, curve = ratios * h / span, np.geomspace(0.02, 20)
 plt.semilogx(curve, 1e3 * exact(curve), k, 1e3 * np.array(found), "o")
-plt.gca().set(xlabel="k", ylabel="sway [mm]")
+plt.gca().set(xlabel="k = (I_beam / I_column) (h / span)", ylabel="sway [mm]")
+plt.legend(["Kleinlogel", "computed"])
 
 assert np.allclose(found, exact(k), rtol=1e-3)

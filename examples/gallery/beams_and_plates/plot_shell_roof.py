@@ -39,5 +39,6 @@ q = -roof.P_dm[2] / roof.omega2  # under gravity along -z
 axes = plt.figure().add_subplot(projection="3d")
 x, y, z = (roof.surface.points + 20 * roof.surface.Phi @ q).T
 axes.plot_trisurf(x, y, z, triangles=roof.surface.triangles, cmap="viridis")
+axes.set(xlabel="x [ft]", ylabel="y [ft]", zlabel="z [ft]", title="20 times its deflection")
 
 assert abs(roof.interface("edge").phi_t[2] @ q / -0.3024 - 1) < 0.01

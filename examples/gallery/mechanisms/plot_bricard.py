@@ -33,9 +33,10 @@ print(fd.mobility(scene))
 
 # %%
 result = fd.forward(scene, end=2.0, output_step=0.02, method=fd.RK4(5e-4))
-plt.plot(result.time, result["r2.b.position"])
+plt.plot(result.time, result["r2.b.position"], label=["x", "y", "z"])
 plt.plot([1, 2], EXACT, "ko")
-plt.gca().set(xlabel="time [s]", ylabel="third hinge [m], x y z")
+plt.gca().set(xlabel="time [s]", ylabel="third hinge [m]")
+plt.legend()
 fd.animate(result, colour="body", traces=["r2.b"])
 
 # %%

@@ -38,7 +38,7 @@ result = fd.forward(scene, end=1.5, output_step=5e-3, method=fd.ROS3(5e-4))
 tip = result["rod.far.position"] @ (1, 1j, 0)
 e1, e2 = -d + L * np.exp(1j * result["hinge0.angle"]), d + L * np.exp(1j * result["hinge1.angle"])
 exact = (e1 + e2) / 2 + 1j * (e2 - e1) * np.sqrt((L / np.abs(e2 - e1)) ** 2 - 0.25)
-plt.plot(tip.real, tip.imag)
+plt.subplot(xlabel="x [m]", ylabel="y [m]", title="path of the tip", aspect="equal").plot(tip.real, tip.imag)
 fd.animate(result, scale="auto", traces=["rod.far"])
 
 # %%

@@ -34,9 +34,9 @@ w = (middle * np.conj(tip)).imag / np.abs(tip)  # from the chord
 
 figure, (path, bent) = plt.subplots(1, 2, figsize=(9, 4), layout="constrained")
 path.plot(tip.real, tip.imag)
-path.set(title="path of the tip [m]", aspect="equal")
+path.set(title="path of the tip", xlabel="x [m]", ylabel="y [m]", aspect="equal")
 bent.plot(result.time, 1e3 * w)
-bent.set(title="middle from the chord [mm]", xlabel="time [s]")
+bent.set(title="middle of the strip", xlabel="time [s]", ylabel="from the chord [mm]")
 
 assert (
     np.abs(tip[[100, 200, 400]] - (0.1737356 - 1.1873578j, -1.1997451 - 0.0246135j, 1.1957429 - 0.1009467j)).max()

@@ -41,6 +41,7 @@ middle = pin + (2 - pin) / 2 * (1 + 1j * np.sqrt(4 * 2.5**2 / abs(2 - pin) ** 2 
 plt.plot(foot.real, foot.imag)
 plt.plot([4, 2, 0], [4, 4, 4], "o")
 plt.title(f"off the line by at most {np.abs(foot.imag[:101] - 4).max():.4f}")
+plt.gca().set(xlabel="x / crank", ylabel="y / crank", aspect="equal")
 
 assert np.abs(foot - (2 * middle - pin)).max() < 1e-9
 assert np.abs(foot[[0, 50, 100]] - [4 + 4j, 2 + 4j, 4j]).max() < 1e-9

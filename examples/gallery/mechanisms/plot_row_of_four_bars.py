@@ -26,16 +26,16 @@ for k in range(3):  # all upright at first, the pins at 1 m/s
     )
 for k, coupler in enumerate(fd.rigid_body(f"bar{k}", **bar) for k in range(2)):
     bodies.append(fd.Body(coupler.name, coupler, position=(k + 0.5, 1, 0), velocity=(1, 0, 0)))
-ground = {f"O{k}": (k, 0, 0) for k in range(3)}
 joints = [fd.Joint(f"foot{k}", "revolute", f"ground.O{k}", f"crank{k}.a") for k in range(3)]
 joints += [fd.Joint(f"near{k}", "revolute", f"crank{k}.b", f"bar{k}.a") for k in range(2)]
 joints += [fd.Joint(f"far{k}", "revolute", f"crank{k + 1}.b", f"bar{k}.b") for k in range(2)]
-scene = fd.Scene(bodies, joints, ground=ground, gravity=(0, -9.81, 0))
+scene = fd.Scene(bodies, joints, ground={f"O{k}": (k, 0, 0) for k in range(3)}, gravity=(0, -9.81, 0))
 result = fd.forward(scene, end=20.0, output_step=0.02, method=fd.RK4(2e-3))
 pin = result["crank0.b.position"] @ (1, 1j, 0)
-plt.plot(result.time, pin.real, result.time, pin.imag)
+plt.plot(result.time, pin.real, result.time, pin.imag, linewidth=1)
 plt.plot([5, 10, 20], np.real(EXACT), "ko", [5, 10, 20], np.imag(EXACT), "ks")
-plt.gca().set(xlabel="time [s]", ylabel="first pin, x and y [m]")
+plt.gca().set(xlabel="time [s]", ylabel="first pin [m]")
+plt.legend(["x", "y", "x, published", "y"], loc="lower center", bbox_to_anchor=(0.5, 1), ncols=4)
 fd.animate(result, colour="body")
 
 # %%

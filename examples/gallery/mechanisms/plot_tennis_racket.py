@@ -20,8 +20,9 @@ scene = fd.Scene([fd.Body("nut", nut, omega_bar=(1e-3, 1.0, 1e-3))])
 result = fd.forward(scene, end=111.0, output_step=0.05, method=fd.RK4(1e-2))
 omega, t = result["nut.omega_bar"], result.time
 momentum = np.array([1, 2, 3]) * omega
-plt.plot(t, omega)
-plt.gca().set(xlabel="time [s]", ylabel="angular velocity, axes of the body [rad/s]")
+plt.plot(t, omega, label=["x: least inertia", "y: middle", "z: greatest"])
+plt.gca().set(xlabel="time [s]", ylabel="angular velocity in body axes [rad/s]")
+plt.legend(loc="lower center", bbox_to_anchor=(0.5, 1), ncols=3)
 
 # %%
 # Half a period lies between two moments when the rate about the middle axis changes its sign.

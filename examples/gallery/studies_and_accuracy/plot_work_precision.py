@@ -29,7 +29,8 @@ with fd.pool(workers=0) as here:
 for name in ladders:
     points = [point for point in chart.points if point.series == name]
     plt.loglog([p.evaluations for p in points], [p.errors["deflection:rod"] for p in points], "o-", label=name)
-plt.gca().set(xlabel="evaluations of the equations", ylabel="error of the deflection, of its largest")
+plt.gca().set(xlabel="evaluations of the equations", ylabel="error of the deflection, relative to its largest")
+plt.gca().xaxis.set_minor_formatter("")
 plt.legend()
 found = fd.orders(chart, "deflection:rod")
 print(found)

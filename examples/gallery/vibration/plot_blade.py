@@ -35,7 +35,7 @@ flap = [k for k, name in enumerate(found.attributes["names"]) if not name.endswi
 
 plt.plot(found["speed"] * 30 / np.pi, found["frequencies"][:, flap])
 plt.plot(list(BEAM), list(BEAM.values()), "kx", list(MEASURED), list(MEASURED.values()), "ko", fillstyle="none")
-plt.gca().set(xlabel="speed [rev/min]", ylabel="flap frequency [Hz]")
+plt.gca().set(xlabel="speed [rev/min]", ylabel="flap frequency [Hz]", title="crosses: beam; circles: measured")
 own = found["frequencies"][[0, 10, 15]][:, flap]
 assert np.allclose(own, list(MEASURED.values()), rtol=0.12), own
 assert np.allclose(own, list(BEAM.values()), rtol=1e-3), own

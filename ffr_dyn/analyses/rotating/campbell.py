@@ -163,10 +163,16 @@ Measure = Callable[[float, Spectrum, int], float]
 
 
 def _off_order(ground: bool, order: float) -> Measure:
-    """How far a frequency is from a multiple of the speed [rad/s]."""
+    """How far a frequency is from a multiple of the speed [rad/s].
+
+    A whirl that is just as fast as the scene stands still in the turning axes. Near there its eigenvalue is real by rounding,
+    and says nothing of how fast it is seen.
+    """
 
     def off(speed: float, one: Spectrum, m: int) -> float:
-        return float(abs(one.seen[m] if ground else one.values[m].imag) - order * speed)
+        value = one.values[m].imag
+        seen = one.found.machine.screws.fastest if ground and value == 0 else one.seen[m] if ground else value
+        return float(abs(seen) - order * speed)
 
     return off
 

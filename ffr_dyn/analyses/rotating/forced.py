@@ -56,7 +56,9 @@ class Forced(OfMoment):
             metavar="NAME", required=True,
         ),
     )  # fmt: skip
-    amplitude: float = field(default=0.0, metadata=option("--amplitude", "Of the input, in its unit.", required=True))
+    amplitude: float = field(
+        default=0.0, metadata=option("--amplitude", "Of the input, in its unit [N, N m, m or rad].", required=True)
+    )
     quantities: tuple[str, ...] = field(
         default=(), metadata=option("--output", "Quantity, such as rod.tip.position; repeat.", required=True)
     )
@@ -111,7 +113,7 @@ def forced(
     about: About = "start",
     path: str | Path | None = None,
 ) -> Result:
-    """How a scene vibrates under a harmonic input of a given amplitude, over its frequency, with all that is nonlinear.
+    """The vibration of a scene under a harmonic input of a given amplitude, over its frequency, with all that is nonlinear.
 
     input     : as of `response`: an effort or, in words, "joint.moment", "body.point.force.x", "driver.angle", "base.x" and
                 "base.x.displacement"; of a load its share

@@ -91,10 +91,10 @@ def periodic(
     floquet : also Floquet's multipliers, at the cost of four periods for every state variable
     outputs : names or patterns of the quantities to keep, as in `forward`
 
-    The attributes have the `period`, `periods` (how many were computed, one of a tenth of the steps counting as a tenth),
-    `returns` (by how much the end is off the beginning, relative) and, with floquet, `multipliers` (pairs of real and
-    imaginary parts, the largest first), `exponents` (growth [1/s] and circular frequency [rad/s] of each), `leading` (what
-    moves in each, as of `linearise`) and `stable`.
+    The attributes have the `period`, `periods` (how many were computed, one of a tenth of the steps counting as a tenth) and
+    `returns` (by how much the end is off the beginning, relative). With floquet there are also `multipliers` (pairs of real
+    and imaginary parts, the largest first) and `exponents` (growth [1/s] and circular frequency [rad/s] of each). Then
+    `leading` has what moves in each, as of `linearise`, and `stable` whether none grows.
 
         turn = fd.periodic(engine)
         turn["main_bearing.force"]

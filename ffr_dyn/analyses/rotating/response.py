@@ -120,20 +120,20 @@ def response(
     time: float = 0.0,
     path: str | Path | None = None,
 ) -> Result:
-    """How outputs of a scene answer a small harmonic input, a row for every frequency.
+    """The response of outputs of a scene to a small harmonic input, a row for every frequency.
 
-    input    : an effort, the name of a load (one doubles it), or in words: "joint.moment" or "joint.force" along a joint
-               coordinate, "driver.moment" in the place of a driver, which then holds what it held, "driver.angle" or
-               "driver.stroke", a change of what a driver prescribes, "driver.angle_rate" and "driver.angle_acceleration", of
-               its rates, "body.point.force.x" or ".moment.z" at a marker, "base.x", an acceleration of the base,
+    input    : an effort, the name of a load (one doubles it), or in words. "joint.moment" or "joint.force" is along a joint
+               coordinate; "driver.moment" in the place of a driver, which then holds what it held; "driver.angle" or
+               "driver.stroke" a change of what a driver prescribes; "driver.angle_rate" and "driver.angle_acceleration" of
+               its rates; "body.point.force.x" or ".moment.z" at a marker; "base.x" an acceleration of the base, beside
                "base.x.velocity" and "base.x.displacement"
     outputs  : quantities ("rod.tip.acceleration": its components) or components; with a base as input, accelerations of
                markers are absolute, as accelerometers have them, so that the gain is the transmissibility; of its
                displacement and velocity, positions and velocities of markers as well
     band_of  : (low, high) [Hz];  frequencies : [Hz], instead; by default the band of the first vibrations
     psd      : (frequency [Hz], one-sided density [input^2/Hz]) of a noise at the input, linear in between, zero outside
-    about    : the scene's "start", its "equilibrium" or its "steady" motion, about which inputs and outputs in the ground's
-               axes do not turn with the bodies
+    about    : the scene's "start" at `time` [s], its "equilibrium" or "steady" motion; inputs and outputs in the
+               ground's axes do not turn with the bodies
 
     The result has `frequency` [Hz], and of each output `gain`, `phase` [deg], `transfer` (real and imaginary), and `parts` of
     it by the modes that do most, named in the attribute "modes"; with a psd `density` and the attribute "rms",

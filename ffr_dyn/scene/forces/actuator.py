@@ -27,6 +27,8 @@ class Actuator(Force):
     stiffness, damping : how much the function falls with the coordinate and its rate, or more [N/m], [N s/m]: implicit
         methods, which cannot see it, then bear any step. They change no force
 
+    Raises InputError for a force that is neither a finite number nor a function, and for negative stiffness or damping.
+
     >>> motor = fd.Actuator("motor", "hinge", force=fd.harmonic(amplitude=2.0, frequency=5.0))
     """
 

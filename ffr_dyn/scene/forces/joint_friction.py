@@ -29,7 +29,7 @@ class JointFriction(Force):
     normal  : a number not below zero, a time function or a Python function of time, below zero while the surfaces are
               apart. It is given: the joint's reaction does not enter
     creep   : [m/s]; a load below friction is not held but creeps, at creep atanh(load / coulomb)
-    static  : friction at rest, not below coulomb: both, with stribeck, or neither
+    static  : friction at rest, in the unit of coulomb [N or 1], not below it: both, with stribeck, or neither
     stribeck : velocity [m/s] over which friction falls from static to coulomb (Stribeck 1902)
     viscous : force over the rate [N s/m]
 

@@ -26,6 +26,8 @@ class JointSpring(Force):
     stiffness : [N/m], or a `Curve` of the force over c - free;  damping : [N s/m], not negative, or a `Curve` over dc/dt
     free      : coordinate without force [m];  preload : [N], positive pulls back;  turns : whole turns at the start
 
+    Raises InputError for numbers that are not finite, negative damping, and a curve of damping that feeds energy.
+
     >>> spring = fd.JointSpring("spring", "hinge", stiffness=20.0, damping=0.1)
     """
 

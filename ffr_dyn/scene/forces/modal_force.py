@@ -32,6 +32,8 @@ class ModalForce(Force):
     body : name of a flexible body
     values : (n,) [1/sqrt(kg) N];  function : a number, a time function or a Python function of time
 
+    Raises InputError for values that are not finite, or of another shape than (n,).
+
     >>> shaker = fd.ModalForce("shaker", "rod", values=[1.0, 0, 0, 0], function=fd.harmonic(amplitude=1.0, frequency=50.0))
     """
 

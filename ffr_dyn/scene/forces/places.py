@@ -257,7 +257,7 @@ class OnJoint(Place):
 
 @dataclass(frozen=True)
 class BetweenAxes(Place):
-    """Markers of two bodies, with axes (3, 3) in columns on both, for the force `who`.
+    """Markers of two bodies, with axes in columns on both, on_i (3, 3) and on_j (3, 3), for the force `who`.
 
     >>> place = fd.BetweenAxes("mount", "ground.wall", "rod.hinge", np.eye(3), np.eye(3))
     """

@@ -48,6 +48,8 @@ class Pressure(Force):
     follower  : True: area and normal follow the elastic deformation, to first order in q; False: they stay those of
                 the undeformed body, fixed to its frame
 
+    Raises InputError for values that are not finite, or of another shape than (P,).
+
     >>> wind = fd.Pressure("wind", "blade", pressure=2e3, follower=True)
     """
 

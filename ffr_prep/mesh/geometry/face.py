@@ -21,7 +21,7 @@ class Face(Brief):
     centre : (3,) centroid of its area [m]; area [m^2]
     point  : (3,) [m] on a plane or an axis, the centre of a sphere or torus, the tip of a cone
     axis   : (3,) the normal of a plane, which points outside, or the axis of what has one
-    radius : of cylinder, sphere, torus [m]; half the angle of a cone [rad]; minor: the second radius of a torus [m]
+    radius : of cylinder, sphere, torus [m]; half the angle of a cone [rad];  minor : the second radius of a torus [m]
     hollow : whether material lies outside of a curved face, as around a bore; None where that is not known
     label, colour : that the file has for it, or "": the colour as #rrggbb
     groups, solids : that it belongs to

@@ -28,7 +28,7 @@ class Faces(Brief):
     points    : (P, 3) [m]
     triangles : for each face (T, 3) indices into points, counter-clockwise seen from outside
     unit      : in which the file has its lengths, in which they are shown and typed: "m", "cm", "mm" or "in"
-    tolerance : within which places and radii are the same, of the size of the body
+    tolerance : within which places and radii are the same, of the size of the body [1]
     notes     : what is to be known, in words
     typed     : what to type for each of the first features, as the table shows it
     size      : the diagonal of the box around all [m]

@@ -29,6 +29,8 @@ class CharacteristicModes:
 
     For many interfaces. Forces at the interfaces then bend the body less than they should, the more the fewer are kept.
 
+    Raises InputError for modes that are neither a whole number nor one of these.
+
     >>> reduction = fp.CharacteristicModes(modes=8, interface_modes=6)
     """
 

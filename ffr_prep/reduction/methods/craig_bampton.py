@@ -29,6 +29,8 @@ class CraigBampton:
 
     The reference conditions are imposed on the sum, so with six of them n = modes + 6 interfaces - 6.
 
+    Raises InputError for modes that are neither a whole number nor one of these.
+
     >>> request = fp.Request(name="rod", reference=fp.FixedTo("hinge"), reduction=fp.CraigBampton(modes=8))
     """
 

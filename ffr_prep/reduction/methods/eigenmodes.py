@@ -20,6 +20,8 @@ class Eigenmodes:
 
     modes : a number, `UpTo` a frequency or to an `Accuracy`
 
+    Raises InputError for modes that are neither a whole number nor one of these.
+
     >>> request = fp.Request(name="rod", reference=fp.FixedTo("hinge"), reduction=fp.Eigenmodes(6))
     """
 

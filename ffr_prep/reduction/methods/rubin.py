@@ -26,6 +26,8 @@ class Rubin:
     Rubin does; MacNeal neglects it, which would leave shapes without mass. As the interfaces are free, fewer modes than
     with `CraigBampton` are needed where joints leave them nearly free.
 
+    Raises InputError for modes that are neither a whole number nor one of these.
+
     >>> request = fp.Request(name="rod", reference=fp.MeanAxis(), reduction=fp.Rubin(8))
     """
 

@@ -84,5 +84,5 @@ def test_standard_input_data_hold_the_sum_with_the_mass(strip, tmp_path):
         of_mass = PP[a, a] - np.einsum("kkij->ij", PP) if a == b else moved[a, b]
         np.testing.assert_allclose(K[PRODUCTS][k], -of_mass, rtol=0, atol=1e-12 * scale)
     (warning,) = back.provenance["warnings"]
-    assert "geometric stiffness in Oe.m1" in warning
-    assert "its sum with mass is kept" in warning
+    assert "Oe.m1 holds geometric stiffness beside inertia" in warning
+    assert "their sum is kept" in warning

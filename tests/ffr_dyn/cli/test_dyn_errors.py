@@ -13,8 +13,7 @@ from places import ROOT
 from synthetic import cloud
 
 from ffr_dyn import cli
-from ffr_dyn.analyses.forward import Forward, forward
-from ffr_dyn.cli.run import begins_as_given
+from ffr_dyn.analyses.forward import forward
 from ffr_dyn.consistency.assemble import assemble
 from ffr_dyn.functions.time_functions import polynomial, table
 from ffr_dyn.integrators import RK4, ROS2, GeneralisedAlpha, HalfExplicit
@@ -406,9 +405,3 @@ def test_a_file_of_another_kind_is_told_by_its_ending(command, name, message, tm
     code, said = run_cli(monkeypatch, capsys, *command, name)
     assert code == 2
     assert message in said
-
-
-def test_commands_that_begin_as_the_scene_gives_it_say_so():
-    assert begins_as_given(Forward()) == []
-    (note,) = begins_as_given(Forward(begin="quasi-static"))
-    assert 'begin = "quasi-static" is of `run` alone' in note

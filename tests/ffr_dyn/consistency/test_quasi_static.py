@@ -10,6 +10,8 @@ from test_dyn_plane import rod, slider_crank
 
 import ffr_dyn as fd
 from ffr_dyn.analyses.integration import integrate
+from ffr_dyn.chart.runner import Job, perform
+from ffr_dyn.chart.variants import Model, Variant
 from ffr_dyn.consistency.assemble import assemble
 from ffr_dyn.consistency.evaluation import total_mass_matrix
 from ffr_dyn.consistency.quasi_static import quasi_static
@@ -92,3 +94,35 @@ def test_rigid_bodies_and_other_words():
     assert quasi_static(start, 0.0) is start
     with pytest.raises(InputError, match="begin is 'still'"):
         fd.forward(scene, end=1.0, output_step=0.1, begin="still")
+
+
+def test_the_solvers_of_others_begin_so_too():
+    scene, how = rotor(30.0, stiffening=False), {"end": 0.01, "output_step": 1e-3, "begin": "quasi-static"}
+    run = fd.forward(scene, **how, method=fd.RK4(1e-5), check=False)
+    exact = fd.reference(scene, **how)
+    np.testing.assert_allclose(exact["rod.q"], run["rod.q"], rtol=0, atol=1e-8 * np.abs(run["rod.q"]).max())
+    with pytest.raises(InputError, match="begin is 'still'"):
+        fd.reference(scene, end=1.0, output_step=0.1, begin="still")
+
+
+def test_runs_of_a_chart_begin_so_each_in_its_own_deflections():
+    """Started straight all of them would swing by twice the steady deflection; now none swings."""
+    scene, span = rotor(200.0, stiffening=False), fd.Span(0.02, 1e-3, begin="quasi-static")
+    measures = fd.measures_of(scene, ["deflection:rod.b"])
+    models = [Model(), Model("without I9", drop=("I9",))]
+    with fd.pool(workers=0) as here:
+        jobs = [Job(scene, Variant("ros3", 1e-4, model), span, measures, repeats=1) for model in models]
+        for job in jobs:
+            (values,) = perform(job).values.values()
+            assert np.ptp(values, axis=0).max() < 1e-3 * np.abs(values).max()
+        made = fd.work_precision(scene, span, here, measures=measures, methods={"ros3": [1e-4]}, repeats=1)
+    found = made.reference.values["deflection:rod.b"]
+    assert np.ptp(found, axis=0).max() < 1e-6 * np.abs(found).max()
+
+
+def test_the_economiser_takes_a_model_for_runs_that_begin_so():
+    scene, how = rotor(200.0, stiffening=False), {"end": 0.02, "output_step": 1e-3, "begin": "quasi-static"}
+    found = fd.economise(scene, ["rod.b.position.x=1e-8"], **how)
+    assert found.settings.analysis.begin == "quasi-static"
+    exact = fd.reference(scene, **how)["rod.b.position.x"]
+    np.testing.assert_allclose(fd.run(found.scene, found.settings)["rod.b.position.x"], exact, rtol=0, atol=1e-8)

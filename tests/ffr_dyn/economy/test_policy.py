@@ -18,6 +18,7 @@ import pytest
 from places import ROOT
 from synthetic import cloud
 
+from ffr_dyn.analyses.forward import Forward
 from ffr_dyn.consistency.assemble import assemble
 from ffr_dyn.economy import (
     adaptive,
@@ -633,7 +634,7 @@ def timing_repeats(policy: Policy, patch: Any) -> Any:
     done = SimpleNamespace(attributes={"evaluations": 7})
     patch.setattr(picture, "simulated", lambda *a, **k: ran.append(1) or done)
     patch.setattr(picture, "make", lambda *a: Made(SCENE, None))
-    settings = SimpleNamespace(start=0.0, end=1.0, output_step=0.01, stabilisation=None)
+    settings = SimpleNamespace(start=0.0, end=1.0, output_step=0.01, stabilisation=None, analysis=Forward())
     picture._point(found_by(policy, settings=settings), EVERYTHING, "all", ONE)
     return len(ran)
 

@@ -15,6 +15,7 @@ from places import ROOT
 
 import ffr_dyn as fd
 import ffr_prep.cli
+from ffr_dyn.studies import draw
 from ffr_dyn.studies.draw import running_mean, tornado
 from ffr_dyn.studies.measures import attribute, measured
 from ffr_dyn.studies.plan import mark
@@ -342,6 +343,32 @@ def test_the_journal_of_another_study_is_refused(folder):
     other = fd.study(folder / "bar.toml", {"g": [1, 2]}, {"angle": "hinge.angle: last"})
     with pytest.raises(InputError, match="is of another study"):
         fd.sweep(other, folder / "t.nc", workers=0)
+
+
+def test_units_are_those_of_the_runs_and_of_the_scene(folder, monkeypatch):
+    """In the table, in its file, and on the axes of its pictures; a formula of outputs has none."""
+    (folder / "bar.toml").write_text(SCENE.replace("length = 1.0", 'length = "100 cm"'))
+    outputs = {
+        "h": "hinge.angle: history",
+        "force": "hinge.force: largest",
+        "e": "hinge.force: error",
+        "w": "= force / g",
+    }
+    study = fd.study(folder / "bar.toml", {"g": [1, 5, 9.81], "length": [0.5, 1.0]}, outputs)
+    table = fd.sweep(study, folder / "t.nc", workers=0)
+    assert table.units == {"length": "m", "time": "s", "h": "rad", "force": "N", "e": "N"}
+    assert fd.load_table(folder / "t.nc").units == table.units
+    with h5py.File(folder / "t.nc") as file:
+        assert file["force"].attrs["units"] == "N"
+    surfaces = []
+    monkeypatch.setattr(
+        draw, "_surface", lambda path, name, first, second, y: surfaces.append((name, first[0], second[0]))
+    )
+    fd.plot_study(table, folder / "p", ["force", "w"])
+    assert [(name, set(axes)) for name, *axes in surfaces] == [
+        ("force [N]", {"g", "length [m]"}),
+        ("w", {"g", "length [m]"}),
+    ]
 
 
 def test_pictures_are_drawn(folder):

@@ -16,7 +16,7 @@ from places import MESHES
 from ffr_prep import cli
 from ffr_prep.body import damped, load_body, rigid_body, save_body
 from ffr_prep.cli.options import interface_of, reference_of
-from ffr_prep.cli.terminal import Steps
+from ffr_prep.cli.terminal import Step, Steps
 from ffr_prep.common.errors import ComputationError, InputError
 from ffr_prep.mesh.mesh import Block
 from ffr_prep.model.coupled import InterfaceRegion
@@ -420,7 +420,9 @@ def test_steps_are_told_on_a_terminal_only(capsys):
         steps.end()
         assert capsys.readouterr().err.startswith(said)
         assert [step.name for step in steps.ended] == ["mesh", "reduce"]
-        assert next(iter(steps.lines())).startswith("time        mesh 0.0 s, reduce 0.0 s")
+        assert re.fullmatch(
+            r"time        0\.0 s; the longest steps: (mesh|reduce) 0\.0 s, \w+ 0\.0 s", next(iter(steps.lines()))
+        )
 
 
 def test_a_terminal_shows_how_far_a_step_is(capsys, monkeypatch):
@@ -446,7 +448,16 @@ def test_the_memory_of_each_step_is_its_own():
     first, _, last = (step.memory for step in steps.ended)
     assert first - last > 300 * 2**20
     *_, memory = steps.lines()
-    assert re.fullmatch(r"memory      \d\.\d\d GiB at most: large .* GiB, small .* GiB, smaller .* GiB", memory)
+    assert re.fullmatch(r"memory      \d\.\d\d GiB at most \(\w+\)", memory)
+
+
+def test_the_longest_steps_are_told_and_the_one_with_most_memory():
+    steps = Steps(visible=False, ended=[Step(f"step {k}", float(k), 2**30 * (5 - k)) for k in range(1, 5)])
+    assert list(steps.lines()) == [
+        "time        10.0 s; the longest steps: step 4 4.0 s, step 3 3.0 s, step 2 2.0 s",
+        "memory      4.00 GiB at most (step 1)",
+    ]
+    assert list(Steps(visible=False, ended=[Step("all", 1.0, None)]).lines())[1] == "memory      not known"
 
 
 # ---- the program as it is started ---------------------------------------------------------------------------------
