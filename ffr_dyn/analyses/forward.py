@@ -22,7 +22,7 @@ from ffr_dyn.analyses.rotating.periodic import periodically
 from ffr_dyn.analyses.settings import Settings
 from ffr_dyn.consistency.assemble import Assembled, assemble
 from ffr_dyn.consistency.quasi_static import quasi_static
-from ffr_dyn.consistency.step_error import Beside, StepError, jumps, step_errors, too_coarse
+from ffr_dyn.consistency.step_error import Beside, StepError, from_rounding, jumps, step_errors, too_coarse
 from ffr_dyn.consistency.unresolved import Vibrations, lasting, leading, vibrations
 from ffr_dyn.functions.stopwatch import Stopwatch
 from ffr_dyn.functions.together import Say, together
@@ -352,9 +352,16 @@ def _cost(assembled: Assembled, result: Result) -> float:
 
 def _finished(runs: _Runs, trial: _Trial, path: str | Path | None, ringing: Set[str] = frozenset()) -> Result:
     """The result of a run with its errors, here and in its file; `ringing` outputs are told to be so."""
-    result = trial.result
+    result, grown = trial.result, from_rounding(trial.result)
     unseen = _unseen(trial)
-    notes = [*result.attributes["notes"], *unseen, *_unresolved(runs, trial, ringing), *_coarse(result)]
+    notes = [
+        *result.attributes["notes"],
+        *unseen,
+        *_unresolved(runs, trial, ringing),
+        *_coarse(result),
+        *_unstable(result, grown),
+    ]
+    trial = replace(trial, errors={name: _by_chance(e, grown.get(name, 0.0)) for name, e in trial.errors.items()})
     told = {name: [e.error, e.of_range] for name, e in trial.errors.items()}
     more: dict[str, Any] = {"notes": notes, "errors": told}
     if trial.errors:
@@ -387,7 +394,7 @@ def _of_the_range(share: float) -> str:
 
 
 def _percent(share: float) -> str:
-    return f"{100 * share:.2g} %"
+    return f"{float(f'{100 * share:.2g}'):g} %"
 
 
 def _unseen(trial: _Trial) -> list[str]:
@@ -432,6 +439,24 @@ def _coarse(result: Result) -> list[str]:
         f"{_others(len(found) - 1)}: between them it is up to {_percent(found[name])} of its range off the curve through "
         "them, or more; take a smaller output_step to see it"
     ]
+
+
+def _unstable(result: Result, grown: Mapping[str, float]) -> list[str]:
+    """A note on what has grown from rounding."""
+    if not grown:
+        return []
+    name = next((one for one in grown if PLACES.search(one)), next(iter(grown)))
+    also = "" if len(grown) == 1 else f", {len(grown) - 1} other output{'s' if len(grown) > 2 else ''} with it"
+    far = f"{grown[name]:.2g} {result.quantities[name].unit}".removesuffix(" 1")
+    return [
+        f"{name} grows from rounding to {far}{also}: the motion is unstable, and how far it has gone by then is chance; give it "
+        "the imperfection that is meant, such as a small load or deflection"
+    ]
+
+
+def _by_chance(told: StepError, size: float) -> StepError:
+    """The error of an output that has grown from rounding to a size, zero for others."""
+    return replace(told, error=max(told.error, size), of_range=max(told.of_range, 1.0)) if size > 0 else told
 
 
 def _others(count: int) -> str:

@@ -55,6 +55,11 @@ ROUNDING = 1e-10  # of what a scene's mass, length and speed make of a unit
 JUMP = 1e-6  # of the coefficients of a function, beyond which it jumps
 AT_ONCE = 2e7  # bytes of numbers that are compared side by side
 COARSE = 0.01  # of the range, by which a row may be off the curve through its neighbours
+SEED, GROWN = (
+    1e-2,
+    1e2,
+)  # of rounding: below one an output begins that has grown from it, above the other it is a motion
+FULL, FEW = 0.3, 2  # of the largest, up to where a growth is even; rows in each third of its decades
 
 
 @dataclass(frozen=True)
@@ -317,6 +322,37 @@ def too_coarse(run: Result) -> dict[str, float]:
         beside = 0.5 * (np.diff(y.table, axis=0) - 0.5 * np.diff(run.time)[:, None] * (w[:-1] + w[1:]))
         off |= zip(names, y.largest(np.abs(beside).max(axis=0)).tolist(), strict=True)
     return {name: share for name, scale in scales.items() if (share := off[name] / scale) > COARSE}
+
+
+def from_rounding(run: Result) -> dict[str, float]:
+    """Outputs that have grown from rounding, as those of an unstable motion do that begins in balance, and how far they have
+    moved; energies, of which little things have less than rounding, are left out.
+
+    Their growth is exponential: as many rows in the middle third of its decades as in the last. A motion that sets in goes
+    with a power of time and has far fewer there.
+    """
+    rounding, found = roundings(run), dict[str, float]()
+    for names in _batches(
+        run, (name for name in rounding if rounding[name] > 0 and run.quantities[name].unit not in ("J", "W"))
+    ):
+        of = _columns(run, names)
+        for k, name in enumerate(names):
+            last = of.first[k + 1] if k + 1 < len(names) else of.table.shape[1]
+            moved = of.table[:, of.first[k] : last] - of.table[:1, of.first[k] : last]
+            grown = np.abs(moved).max(axis=1, initial=0.0)
+            if _grows_evenly(np.maximum.accumulate(grown), SEED * rounding[name], GROWN * rounding[name]):
+                found[name] = float(grown.max())
+    return found
+
+
+def _grows_evenly(size: Array, seed: float, motion: float) -> bool:
+    """Whether a size (T,) that never falls grows from below a seed to above a motion, exponentially."""
+    nonzero = size[size > 0]
+    if nonzero.size == 0 or nonzero[0] > seed or nonzero[-1] < motion:
+        return False
+    decades = np.log(nonzero / nonzero[0]) / np.log(FULL * nonzero[-1] / nonzero[0])
+    middle, last = (np.count_nonzero((decades > third) & (decades <= third + 1 / 3)) for third in (1 / 3, 2 / 3))
+    return bool(min(middle, last) >= FEW and last <= FEW * (middle + 1))
 
 
 def _rate_of(name: str) -> str:

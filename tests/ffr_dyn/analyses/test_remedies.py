@@ -199,6 +199,22 @@ def struck(damping: float) -> Scene:
     return replace(HINGED, forces=(spring, stop), loads=(moment,))
 
 
+def on_springs(stiff: bool) -> Scene:
+    """A rotor that turns in a housing on springs, in a joint or in a stiff bushing."""
+    housing = fd.rigid_body("housing", mass=5.0, inertia=(1, 1, 1), points={"o": (0, 0, 0)})
+    rotor = fd.rigid_body("rotor", mass=1.0, inertia=(0.1, 0.1, 0.2), points={"o": (0, 0, 0)})
+    springs = fd.Bushing("springs", "ground.O", "housing.o", np.diag([1e4, 1e4, 1e7, 1e7, 1e7, 1e7]))
+    bearing = fd.Bushing("bearing", "housing.o", "rotor.o", np.diag([1e7, 1e7, 1e7, 1e6, 1e6, 0.0]))
+    joint = Joint("mast", "revolute", "housing.o", "rotor.o")
+    return Scene(
+        (Body("housing", housing), Body("rotor", rotor, omega_bar=(0, 0, 5.0))),
+        () if stiff else (joint,),
+        () if stiff else (Driver("motor", "mast", fd.polynomial(0.0, 5.0)),),
+        forces=(springs, bearing) if stiff else (springs,),
+        ground=GROUND,
+    )
+
+
 def governor(moment: float) -> Scene:
     """An arm that an axle of constant speed lifts, against a moment [N m]."""
     return Scene(
@@ -851,6 +867,8 @@ INPUT = [
     Case(lambda: fd.steady(governor(1000.0)), lambda: fd.steady(governor(1.0))),
     Case(lambda: fd.periodic(swung(0.0), period=1 / 1.3), lambda: fd.periodic(swung(1.0), period=1 / 1.3)),
     Case(lambda: fd.periodic(struck(0.05), period=1 / 1.3), lambda: fd.periodic(struck(5.0), period=1 / 1.3)),
+    Case(lambda: fd.periodic(struck(0.2), period=1 / 1.3), lambda: fd.periodic(struck(5.0), period=1 / 1.3)),
+    Case(lambda: fd.steady(on_springs(stiff=False)), lambda: fd.steady(on_springs(stiff=True))),
     Case(
         lambda: fd.floquet_motion(swung(1.0), 9, period=1 / 1.3),
         lambda: fd.floquet_motion(swung(1.0), 0, period=1 / 1.3),

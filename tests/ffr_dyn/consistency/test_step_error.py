@@ -7,7 +7,17 @@ import pytest
 
 from ffr_dyn.analyses.forward import forward
 from ffr_dyn.compile.scene_tables import compile_scene
-from ffr_dyn.consistency.step_error import COARSE, FLOOR, IN_PART, Beside, jumps, ranges, step_errors, too_coarse
+from ffr_dyn.consistency.step_error import (
+    COARSE,
+    FLOOR,
+    IN_PART,
+    Beside,
+    from_rounding,
+    jumps,
+    ranges,
+    step_errors,
+    too_coarse,
+)
 from ffr_dyn.functions.formula import formula
 from ffr_dyn.functions.time_functions import piecewise, table
 from ffr_dyn.integrators import RK4, ROS2, ROS3
@@ -191,3 +201,34 @@ def test_functions_that_jump_or_ask_a_servo_for_rates_that_do():
     assert found(0.0, Servo("servo", "rail", target=ramp, kp=1.0, kd=1.0, coordinate="stroke"))
     assert found(0.0, Servo("servo", "rail", target=formula("min(t, 0.3)"), kp=1.0, kd=1.0, coordinate="stroke"))
     assert not found(0.0, Servo("servo", "rail", target=ramp, kp=1.0, coordinate="stroke"))
+
+
+def test_exponential_growth_from_rounding_is_no_motion_that_sets_in():
+    begun = np.maximum(TIME - 0.2, 0.0)
+    grown = 1e-16 * np.cosh(np.clip(40 * TIME, 0.0, 35.0))
+    run = result(
+        a_position=TIME,
+        b_position=grown,
+        c_position=1.0 + grown,
+        d_position=begun**2,
+        e_position=begun**6,
+        f_position=1e-17 + begun,
+    )
+    assert set(from_rounding(run)) == {"b.position", "c.position"}
+
+
+@pytest.mark.parametrize("plane", ["z", "none"])
+def test_a_pendulum_that_stands_on_its_head_falls_by_chance(plane):
+    """Half a turn is known to 1e-16 only, which the motion multiplies by cosh(lambda t); from a given angle it is known."""
+    body = rigid_body("a", mass=2.0, inertia=[0.1, 0.2, 0.25], centre_of_mass=(0, -0.3, 0), points={"o": (0, 0, 0)})
+
+    def falling(angle, end):
+        bodies, joints = (Body("a", body, rotation=(0, 0, angle)),), (Joint("j", "revolute", "ground.o", "a.o"),)
+        scene = Scene(bodies, joints, ground={"o": (0, 0, 0)}, gravity=(0, -9.81, 0), plane=plane)
+        return forward(scene, end=end, output_step=0.02).attributes
+
+    by_chance, known = falling(np.pi, 12.0), falling(np.pi - 1e-3, 3.0)
+    assert any("grows from rounding" in note for note in by_chance["notes"])
+    assert by_chance["errors"]["j.angle"][1] >= 1.0
+    assert not any("grows from rounding" in note for note in known["notes"])
+    assert known["errors"]["j.angle"][1] < 1e-3
