@@ -449,8 +449,8 @@ def _unstable(result: Result, grown: Mapping[str, float]) -> list[str]:
     also = "" if len(grown) == 1 else f", {len(grown) - 1} other output{'s' if len(grown) > 2 else ''} with it"
     far = f"{grown[name]:.2g} {result.quantities[name].unit}".removesuffix(" 1")
     return [
-        f"{name} grows from rounding to {far}{also}: the motion is unstable, and how far it has gone by then is chance; give it "
-        "the imperfection that is meant, such as a small load or deflection"
+        f"{name} grows from rounding to {far}{also}: the motion is unstable, and how far it has gone by then is chance; give "
+        "it the imperfection that is meant, such as a small load or deflection"
     ]
 
 
