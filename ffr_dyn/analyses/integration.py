@@ -32,6 +32,7 @@ from ffr_dyn.kernels.tables import (
     AT,
     EVALUATIONS,
     FILLED,
+    HERE,
     LEAST,
     NEXT,
     NOW,
@@ -243,7 +244,9 @@ def _started(assembled: Assembled, engine: Engine, energy: EnergyWatch, seen: Se
     status = record_row(engine, start, first, 0)
     if status != OK:
         raise failing.failure(engine.system, engine.work, status, start)
-    first = with_limits(assembled.system, assembled.all_rows, with_all_reactions(assembled, first))
+    first = with_all_reactions(assembled, first)
+    if engine.work.independence[HERE] < AT:
+        first = with_limits(assembled.system, assembled.all_rows, first)
     kept.add(View(assembled.system, first), np.zeros(1, dtype=np.int64))
     run = _Run(engine, energy, kept, seen, 0)
     if isinstance(kept, Measured):

@@ -55,10 +55,7 @@ ROUNDING = 1e-10  # of what a scene's mass, length and speed make of a unit
 JUMP = 1e-6  # of the coefficients of a function, beyond which it jumps
 AT_ONCE = 2e7  # bytes of numbers that are compared side by side
 COARSE = 0.01  # of the range, by which a row may be off the curve through its neighbours
-SEED, GROWN = (
-    1e-2,
-    1e2,
-)  # of rounding: below one an output begins that has grown from it, above the other it is a motion
+SEED, GROWN = 1e-2, 1e2  # of rounding, from which an output has grown: it begins below the first, and is a motion above
 FULL, FEW = 0.3, 2  # of the largest, up to where a growth is even; rows in each third of its decades
 
 

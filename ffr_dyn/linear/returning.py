@@ -29,11 +29,8 @@ AMPLIFIED = 30.0  # of a step over what is open, of cheap maps: beyond it differ
 # What counts as brought back, by the step to the fixed point: [rad], or relative to the scene; rates times the period.
 ROUGH, RETURNS = 1e-6, 1e-10  # of coarse steps, of the right ones
 DEFLECTS = 5e-9  # of elastic coordinates, and of their rates, relative to the largest of the body over the period
-ROUNDED, LITTLE, FLAT = (
-    1e-13,
-    1e-11,
-    0.3,
-)  # rounding: a step of this size, or a little one that is this part of the last
+# Rounding: a step of the first size, or one of the second that is FLAT of the last.
+ROUNDED, LITTLE, FLAT = 1e-13, 1e-11, 0.3
 REPEATS = 1e-7  # of the second period, as RETURNS: drivers and loads that come back
 NEWTONS = 8
 

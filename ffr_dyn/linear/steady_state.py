@@ -445,9 +445,9 @@ def _turning_on(near: Steady) -> tuple[int, Array]:
     """How many free motions only turn on what turns by itself; with them first, (d, d) free motions that are orthogonal."""
     system, about = near.machine.system, near.about
     now = At(system.scene, system.layout, near.machine.time, near.x, near.v)
-    looking = any(_looks(now, force) for force in forces_of(system.scene))
+    together = any(_looks(now, force) for force in forces_of(system.scene))
     V = to_body_axes(system.layout, near.x, near.v)
-    motions = near.Z.T @ about.M @ turning_on(system, about.jacobian, V, sizes_of(system), looking)
+    motions = near.Z.T @ about.M @ turning_on(system, about.jacobian, V, sizes_of(system), together)
     count = motions.shape[1]
     return count, np.linalg.qr(motions, mode="complete")[0] if count else np.eye(len(motions))
 

@@ -19,15 +19,16 @@ FREE = 1e-7  # of rows, relative to the motion
 STILL = 1e-9  # of velocities, relative to the largest
 
 
-def turning_on(system: System, jacobian: Array, V: Array, sizes: Array, looking: bool) -> Array:
+def turning_on(system: System, jacobian: Array, V: Array, sizes: Array, together: bool) -> Array:
     """(V, g) of g groups of connected bodies their velocities, of the largest size one, where the rows leave them free.
 
     jacobian : (C, V);  V : (V,) velocities of all bodies, body axes;  sizes : (V,) that count as one
+    together : whether forces depend on the angles, so that only all bodies at once turn on without a change
     """
     place, largest = system.layout, float(np.abs(V / sizes).max(initial=0.0))
     slices = [slice(place.iv[b], place.iv[b] + 6 + place.n[b]) for b in range(len(place.n))]
-    groups, found = _groups(system.scene, np.array([np.abs(jacobian[:, one]).any(axis=1) for one in slices])), []
-    groups = 0 * groups if looking else groups
+    rows, found = np.array([np.abs(jacobian[:, one]).any(axis=1) for one in slices]), []
+    groups = np.zeros(len(slices)) if together else _groups(system.scene, rows)
     for group in np.unique(groups):
         motion = np.zeros_like(V)
         for b in np.flatnonzero(groups == group):

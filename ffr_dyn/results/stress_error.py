@@ -11,9 +11,8 @@ import numpy as np
 
 from ffr_dyn.functions.rotation import rotation_matrix
 from ffr_dyn.results.result import Result
+from ffr_prep.body import PRODUCTS
 from ffr_prep.common.arrays import Array
-
-_PRODUCTS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 
 
 def stress_error(result: Result, body: str) -> float | None:
@@ -39,7 +38,7 @@ def _largest(result: Result, body: str, left_out: Array) -> float | None:
     axes = rotation_matrix(p / np.linalg.norm(p, axis=1, keepdims=True))
     gravity = np.array(result.attributes.get("gravity", np.zeros(3)), float)
     origin = np.einsum("tji,tj->ti", axes, _rate(result.time, v) - gravity)
-    products = np.stack([omega[:, a] * omega[:, b] for a, b in _PRODUCTS], axis=1)
+    products = np.stack([omega[:, a] * omega[:, b] for a, b in PRODUCTS], axis=1)
     accelerations = np.hstack([origin, _rate(result.time, omega), products])
     return float((np.abs(accelerations) @ left_out).max())
 

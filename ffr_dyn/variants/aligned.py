@@ -16,7 +16,7 @@ import numpy as np
 from ffr_dyn.scene.own_frame import OwnFrame
 from ffr_dyn.scene.scene import Body, Scene, altered, body_normal, used_interfaces
 from ffr_dyn.variants.variant import with_basis
-from ffr_prep.body import FlexibleBody, FrameMarker, remembered
+from ffr_prep.body import PRODUCTS, FlexibleBody, FrameMarker, remembered
 from ffr_prep.common.arrays import Array
 
 BESIDE = 1e-6  # of the size of a body: what a mesh leaves of a place in its plane
@@ -51,9 +51,6 @@ def about_height(model: FlexibleBody, k: int, height: float) -> FlexibleBody:
     interfaces = tuple(replace(i, position=i.position - up) for i in model.interfaces)
     made = replace(model, r_dm=model.r_dm - model.mass * up, rr_dm=rr_dm, rP_dm=rP_dm, interfaces=interfaces)
     return made if K is None else replace(made, stiffening=_from_above(K, k, height))
-
-
-PRODUCTS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))  # of rates, as load matrices have them
 
 
 def _from_above(stiffening: Array, k: int, height: float) -> Array:

@@ -10,6 +10,7 @@ coordinates q (n,) [m sqrt(kg)]. Integrals over the mass carry the suffix ``_dm`
 The numbered invariants I1...I9 and Shabana's S_bar family are read-only views of these integrals.
 """
 
+from ffr_prep.body.accelerations import PRODUCTS
 from ffr_prep.body.constructors import check_point, recombined, rigid_body, truncated, with_point
 from ffr_prep.body.damping import Damping, damped, with_damping
 from ffr_prep.body.file import content_hash, load_body, save_arrays, save_body, surface_arrays, surface_of
@@ -47,6 +48,7 @@ from ffr_prep.body.units_doubt import units_doubts
 
 __all__ = [
     "MESH_ERROR",
+    "PRODUCTS",
     "SECTION_FORCES",
     "STEADY_STRESS",
     "TENSOR",
