@@ -175,6 +175,8 @@ def _with_nearest(item: Any, text: str) -> str:
         text = text.replace("no such kind", f"no kind {given!r}")
     elif item["type"] == "missing":
         return "is required, and missing" + (f"; {_ANALYSIS}" if item["loc"] == ("analysis",) else "")
+    elif item["type"] == "dict_type" and isinstance(item["input"], list):
+        return f"must be tables with names; write [{'.'.join(map(str, item['loc']))}.NAME] for each"
     elif item["type"] == "literal_error":
         given, known = item["input"], re.findall(r"'([^']*)'", text)
     else:

@@ -102,6 +102,11 @@ def changed(old: str, new: str) -> str:
     return SCENE.replace(old, new)
 
 
+def test_a_list_of_tables_is_told_to_be_tables_with_names(tmp_path):
+    with pytest.raises(InputError, match=r"joints: must be tables with names; write \[joints\.NAME\] for each"):
+        load_scene(written(tmp_path, '[[joints]]\nkind = "revolute"\n'))
+
+
 def test_what_is_missing_is_said_with_what_to_write(tmp_path):
     with pytest.raises(
         InputError, match=r'analysis: is required, and missing; write a table \[analysis\] with kind = "steady"'
