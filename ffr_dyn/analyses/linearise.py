@@ -214,7 +214,7 @@ def linearise(
     modes = modes / np.where((size := np.abs(modes).max(axis=0)) > 0, size, 1.0)
     where = assembled.system.scene, assembled.system.layout
     screws = screws_of(where[1], assembled.x, assembled.v)
-    seen, whirl = whirls(*where, screws, assembled.x, rates_of(solved.values, len(parts), solved.shift), parts)
+    seen, whirl, _ = whirls(*where, screws, assembled.x, rates_of(solved.values, len(parts), solved.shift), parts)
     ways = ways_of(seen, whirl)
     rates_seen = np.hypot(solved.values.real, np.where([bool(way) for way in ways], seen, solved.values.imag))
     leading = in_words(*where, assembled.x, near.M, modes, rates_seen, ways)

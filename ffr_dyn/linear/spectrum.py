@@ -21,7 +21,7 @@ from ffr_dyn.linear.hill import moved_on, one_of_each
 from ffr_dyn.linear.matrices import modes_of
 from ffr_dyn.linear.prestrained import Prestrained, prestrained
 from ffr_dyn.linear.steady_state import Steady
-from ffr_dyn.linear.whirl import ways_of, whirls
+from ffr_dyn.linear.whirl import ONE_WAY, ways_of, whirls
 from ffr_dyn.linear.words import in_words
 from ffr_prep.common.arrays import Array
 
@@ -36,6 +36,7 @@ class Spectrum:
     shift : [rad/s] from part to part
     seen  : (m,) [rad/s] frequencies from the ground, positive of forward whirls
     whirl : (m,) share of the amplitude that whirls so (see `ffr_dyn.linear.whirl`)
+    body  : (m,) number of the body that moves most
     """
 
     found: Steady
@@ -44,6 +45,13 @@ class Spectrum:
     shift: float
     seen: Array
     whirl: Array
+    body: Array
+
+    @property
+    def speed(self) -> Array:
+        """(m,) [rad/s] of the body that moves most."""
+        found: Array = np.linalg.norm(self.found.machine.screws.w, axis=1)[self.body]
+        return found
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -64,6 +72,7 @@ class Spectrum:
             parts=self.parts[..., numbers],
             seen=self.seen[numbers],
             whirl=self.whirl[numbers],
+            body=self.body[numbers],
         )
 
 
@@ -84,8 +93,8 @@ def spectrum(found: Steady) -> Spectrum:
     parts = parts / np.sqrt(np.einsum("hvm,vw,hwm->m", parts.conj(), found.about.M, parts, optimize=True).real)
     machine = found.machine
     rates = rates_of(values, len(parts), of.shift)
-    seen, whirl = whirls(machine.system.scene, machine.place, machine.screws, found.x, rates, parts)
-    return Spectrum(found, values, parts, of.shift, seen, whirl)
+    seen, whirl, body = whirls(machine.system.scene, machine.place, machine.screws, found.x, rates, parts)
+    return Spectrum(found, values, parts, of.shift, seen, whirl, body)
 
 
 def rates_of(values: Array, count: int, shift: float) -> Array:
@@ -100,20 +109,20 @@ def _with_still_ones(now: Spectrum, count: int) -> Spectrum:
     missing = count - now.values.size
     if missing <= 0:
         return now
-    parts = np.concatenate([now.parts, np.zeros((*now.parts.shape[:2], missing))], axis=2)
-    seen = np.append(now.seen, np.full(missing, now.found.machine.screws.fastest))
+    none = np.zeros(missing)
     return replace(
         now,
-        values=np.append(now.values, np.zeros(missing)),
-        parts=parts,
-        seen=seen,
-        whirl=np.append(now.whirl, np.full(missing, np.nan)),
+        values=np.append(now.values, none),
+        parts=np.concatenate([now.parts, np.zeros((*now.parts.shape[:2], missing))], axis=2),
+        seen=np.append(now.seen, none),
+        whirl=np.append(now.whirl, none * np.nan),
+        body=np.append(now.body, none.astype(int)),
     )
 
 
 def followed(before: Spectrum, now: Spectrum) -> Spectrum:
     """The vibrations at another speed in the order of those before, each by the conjugate, and the numbering of its parts,
-    that goes on from it."""
+    that goes on from it. A whirl that stands still in the turning axes is seen as fast as its body turns."""
     now = _with_still_ones(now, before.values.size)
     candidates = [(turn, by) for by in ((0, -1, 1) if now.shift else (0,)) for turn in (False, True)]
     costs = np.array([_costs(before, _turned(now, *one)) for one in candidates])
@@ -127,7 +136,11 @@ def followed(before: Spectrum, now: Spectrum) -> Spectrum:
     lost = ~parts.any(axis=(0, 1))
     if lost.any() and parts.shape == before.parts.shape:
         parts[..., lost] = before.parts[..., lost]
-    return replace(now.only(columns), values=values, parts=parts)
+    found = replace(now.only(columns), values=values, parts=parts)
+    found = replace(found, body=np.where(lost, before.body, found.body))
+    still = (values.imag == 0) & (before.whirl > ONE_WAY)
+    seen, whirl = np.where(still, found.speed, found.seen), np.where(still, before.whirl, found.whirl)
+    return replace(found, seen=seen, whirl=whirl)
 
 
 def _turned(of: Spectrum, conjugate: bool, by: int) -> Spectrum:

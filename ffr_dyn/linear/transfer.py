@@ -18,13 +18,14 @@ from ffr_prep.common.arrays import Array
 
 POINTS, AROUND = 400, 41  # frequencies of a band, and those around each resonance
 GAUSS, BELOW = 3, 1e-5  # points between frequencies of an integral; the first one after zero, of the last
+FREE = 1e-6  # of the largest eigenvalue: what is below is a free motion by rounding, no part
 BESIDE = 1e-3  # of an undamped frequency, as wide as its resonance is taken
 
 
 @dataclass(frozen=True)
 class Transfer:
     """frequencies (F,) [Hz];  H (F, O) of O outputs to one input;  parts (F, O, K) of it by the modes numbered `modes` (K,),
-    of each pair the eigenvalue (K,) [1/s] with the positive frequency in `values`."""
+    of each pair the eigenvalue (K,) [1/s] with the positive frequency in `values`, of what only decays each."""
 
     frequencies: Array
     H: Array
@@ -43,11 +44,13 @@ def transfer(A: Array, B: Array, C: Array, D: Array, frequencies: Array, count: 
     H, powers = receptances(A, B, C, D, frequencies, order), _powers(s, B, order)
     values, left, right = eig(A, left=True, right=True)
     scale = np.einsum("sk,sk->k", left.conj(), right)
-    chosen = np.flatnonzero((values.imag > 0) & (np.abs(scale) > 1e-12))
+    moves = (values.imag >= 0) & (np.abs(values) > FREE * np.abs(values).max(initial=0.0))
+    chosen = np.flatnonzero(moves & (np.abs(scale) > 1e-12))
     seen, fed = C @ right[:, chosen] / scale[chosen], left[:, chosen].conj().T @ B
     pole = s[:, None, None] - values[chosen]
     twin = s[:, None, None] - values[chosen].conj()
-    parts = seen * (powers @ fed.T)[:, None] / pole + seen.conj() * (powers @ fed.conj().T)[:, None] / twin
+    paired = values[chosen].imag > 0
+    parts = seen * (powers @ fed.T)[:, None] / pole + paired * seen.conj() * (powers @ fed.conj().T)[:, None] / twin
     size = np.abs(parts).max(axis=(0, 1), initial=0.0) / np.maximum(np.abs(H).max(initial=0.0), 1e-300)
     most = np.sort(np.argsort(-size, kind="stable")[:count])
     most = most[np.argsort(np.abs(values[chosen][most]), kind="stable")]
@@ -94,9 +97,9 @@ def band(values: Array, low: float | None = None, high: float | None = None) -> 
 
 
 def mean_square(A: Array, B: Array, C: Array, D: Array, psd: Array, order: int = 0) -> Array:
-    """(O,) of the outputs under a noise, (K, 2) frequencies [Hz] and one-sided densities, linear in between: by Gauss's
-    formula between its frequencies, those of `band` and zero."""
-    f, density = psd[np.argsort(psd[:, 0], kind="stable")].T
+    """(O,) of the outputs under a noise, (K, 2) rising frequencies [Hz] and one-sided densities, linear in between: by
+    Gauss's formula between its frequencies, those of `band` and zero."""
+    f, density = psd.T
     ends = np.unique(np.concatenate([f, band(np.linalg.eigvals(A), f[0] or BELOW * f[-1], f[-1])]))
     half, middle = 0.5 * np.diff(ends), 0.5 * (ends[1:] + ends[:-1])
     at, weight = np.polynomial.legendre.leggauss(GAUSS)

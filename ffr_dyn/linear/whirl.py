@@ -27,9 +27,12 @@ EQUAL = 1e-8  # of eigenvalues that are one, relative
 LEAST = 1e-6  # of a turning relative to the fastest body's: what counts as turning
 
 
-def whirls(scene: Scene, place: Layout, screws: Screws, x: Array, rates: Array, parts: Array) -> tuple[Array, Array]:
-    """Frequencies (m,) [rad/s] seen from the ground of modes, positive where the whirl is forward; and the share (m,) of
-    their amplitude that has this frequency: 1 for a circle, and any whirl of an ellipse, 1/2 for a line in the turning axes.
+def whirls(
+    scene: Scene, place: Layout, screws: Screws, x: Array, rates: Array, parts: Array
+) -> tuple[Array, Array, Array]:
+    """Frequencies (m,) [rad/s] seen from the ground of modes, positive where the whirl is forward; the share (m,) of their
+    amplitude that has this frequency: 1 for a circle, and any whirl of an ellipse, 1/2 for a line in the turning axes; and
+    the number (m,) of the body that moves most.
 
     rates, parts : (h, m) [rad/s] and (h, V, m) of the harmonics of each mode in the turning axes
 
@@ -40,13 +43,14 @@ def whirls(scene: Scene, place: Layout, screws: Screws, x: Array, rates: Array, 
     seen, share = np.abs(rates[main, np.arange(len(main))]), np.full(len(main), np.nan)
     speeds = np.linalg.norm(screws.w, axis=1)
     moving = np.array([_integrals(body, place, screws, x, b, parts) for b, body in enumerate(scene.bodies)])
+    most = np.argmax(moving.sum(axis=(1, 2)), axis=0)
     for m in np.flatnonzero(rates[main, np.arange(len(main))]):
-        b = int(np.argmax(moving[..., m].sum(axis=(1, 2))))
+        b = most[m]
         forth, back, along = moving[b, ..., m]
         across = (forth + back).sum()
         if along.sum() <= ALONG * across and across > 0 and speeds[b] > LEAST * screws.fastest:
             seen[m], share[m] = _from_the_ground(speeds[b], rates[:, m], forth, back)
-    return seen, share
+    return seen, share, most
 
 
 def _from_the_ground(speed: float, rates: Array, forth: Array, back: Array) -> tuple[float, float]:

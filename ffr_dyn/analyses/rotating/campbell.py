@@ -2,7 +2,7 @@
 
 The steady motion at each speed begins where the last one ended; its vibrations are followed by their shapes
 (`ffr_dyn.linear.spectrum`). Where a frequency crosses a multiple of the speed, or a vibration begins to grow, is found by the
-secant method on steady motions in between.
+by Brent's method on steady motions in between.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
+from scipy.optimize import brentq
 
 from ffr_dyn.analyses.registry import OfMoment, option
 from ffr_dyn.analyses.rotating.steady import GROWS, SPEEDS, TURN, distinct, growing
@@ -33,7 +34,7 @@ from ffr_prep.common.errors import InputError
 from ffr_prep.common.progress import no_count
 
 MODES = 10
-SECANTS, MET = 12, 1e-8  # of a crossing: steps, and of a speed relative to the range
+MET = 1e-8  # of the speed of a crossing, relative to the range
 
 
 @dataclass(frozen=True)
@@ -125,20 +126,31 @@ def campbell(
         progress(len(spectra), len(values) + min(modes, spectra[0].values.size))
     if not spectra[0].values.size:
         raise InputError("nothing vibrates: joints and the driver fix every motion, or what they leave is free")
-    middle = spectra[len(spectra) // 2]
+    middle = _told_by(spectra)
     whirling = np.nan_to_num(middle.whirl) > ONE_WAY
     everything, called = _slowest(spectra, whirling), middle.names
-    order, critical = everything[:modes], list[dict[str, Any]]()
-    for count, m in enumerate(order.tolist(), 1):
-        critical += _criticals(at, values, spectra, m, bool(whirling[m]), orders, called[m])
-        progress(len(values) + count, len(values) + order.size)
-    limits = [{"speed": one, "mode": called[m]} for m in everything.tolist() for one in _limits(at, values, spectra, m)]
+    order, critical, limits = everything[:modes], list[dict[str, Any]](), list[dict[str, Any]]()
+    for count, m in enumerate(everything.tolist(), 1):
+        shown = count <= order.size
+        found, rows = _criticals(
+            at, list(zip(values, spectra, strict=True)), m, bool(whirling[m]), orders if shown else ()
+        )
+        critical += [{**one, "mode": called[m]} for one in found]
+        limits += [{"speed": speed, "mode": called[m]} for speed in _limits(at, rows, m)]
+        if shown:
+            progress(len(values) + count, len(values) + order.size)
     kept = [one.only(order) for one in spectra]
     crossed = {"orders": [float(k) for k in orders], "critical": critical, "limits": limits}
-    found = _as_result(scene, time, values, kept, [called[m] for m in order.tolist()], whirling[order], crossed)
+    result = _as_result(scene, time, values, kept, [called[m] for m in order.tolist()], whirling[order], crossed)
     if path is not None:
-        save_result(found, path)
-    return found
+        save_result(result, path)
+    return result
+
+
+def _told_by(spectra: Sequence[Spectrum]) -> Spectrum:
+    """That nearest to the middle where most ways of whirling are known: at rest there are none."""
+    order = sorted(range(len(spectra)), key=lambda k: abs(k - len(spectra) // 2))
+    return max((spectra[k] for k in order), key=lambda one: int(np.isfinite(one.whirl).sum()))
 
 
 def _slowest(spectra: Sequence[Spectrum], whirling: Array) -> Array:
@@ -159,40 +171,50 @@ def _at_speeds(scene: Scene, turn: str, time: float) -> Callable[[float, Spectru
 
 # ---- crossings ------------------------------------------------------------------------------------------------------
 
+AtSpeed = Callable[[float, Spectrum | None], Spectrum]
+Row = tuple[float, Spectrum]
 Measure = Callable[[float, Spectrum, int], float]
 
 
 def _off_order(ground: bool, order: float) -> Measure:
-    """How far a frequency is from a multiple of the speed [rad/s].
+    """How far a frequency is from a multiple of the speed [rad/s]; zero where it is none but by rounding.
 
-    A whirl that is just as fast as the scene stands still in the turning axes. Near there its eigenvalue is real by rounding,
-    and says nothing of how fast it is seen.
+    A whirl that is just as fast as its body stands still in the turning axes. Near there its eigenvalue is real, and says
+    nothing of how fast it is seen.
     """
 
     def off(speed: float, one: Spectrum, m: int) -> float:
         value = one.values[m].imag
-        seen = one.found.machine.screws.fastest if ground and value == 0 else one.seen[m] if ground else value
-        return float(abs(seen) - order * speed)
+        seen = one.speed[m] if ground and value == 0 else one.seen[m] if ground else value
+        found = float(abs(seen) - order * abs(speed))
+        return found if abs(found) > MET * abs(speed) else 0.0
 
     return off
 
 
 def _criticals(
-    at: Callable[[float, Spectrum | None], Spectrum],
-    speeds: Sequence[float],
-    spectra: Sequence[Spectrum],
-    m: int,
-    ground: bool,
-    orders: Sequence[float],
-    name: str,
-) -> list[dict[str, Any]]:
-    """Where a vibration crosses orders, as in the attributes."""
-    axes = "ground" if ground else "turning"
-    return [
-        {"speed": speed, "order": float(k), "mode": name, "axes": axes}
-        for k in orders
-        for speed in _crossings(at, speeds, spectra, m, _off_order(ground, float(k)))
-    ]
+    at: AtSpeed, rows: list[Row], m: int, ground: bool, orders: Sequence[float]
+) -> tuple[list[dict[str, Any]], list[Row]]:
+    """Where a vibration crosses orders, as in the attributes; and the rows, with those between at which it grows.
+
+    A shaft that is not round stands still in the turning axes and grows over a range of speeds, whose ends are critical.
+    """
+    found, all_rows = list[dict[str, Any]](), rows
+    for order in map(float, orders):
+        for crossing in _crossings(at, rows, m, _off_order(ground, order)):
+            row, speeds = _row_at(at, rows, crossing), [crossing]
+            if ground and row[1].values[m].imag == 0 and _grown(*row, m) > 0:
+                below = [one for one in rows if one[0] < crossing and _grown(*one, m) < 0][-1:]
+                above = [one for one in rows if one[0] > crossing and _grown(*one, m) < 0][:1]
+                speeds = [_between(at, one, row, m, _grown) for one in (*below, *above)]
+                all_rows = sorted([*all_rows, row], key=lambda row: row[0])
+            found += [{"speed": speed, "order": order, "axes": "ground" if ground else "turning"} for speed in speeds]
+    return found, all_rows
+
+
+def _row_at(at: AtSpeed, rows: Sequence[Row], speed: float) -> Row:
+    near = min(rows, key=lambda row: abs(row[0] - speed))
+    return near if near[0] == speed else (speed, followed(near[1], at(speed, near[1])))
 
 
 def _growth(speed: float, one: Spectrum, m: int) -> float:
@@ -200,64 +222,46 @@ def _growth(speed: float, one: Spectrum, m: int) -> float:
     return float(one.values[m].real)
 
 
-def _limits(
-    at: Callable[[float, Spectrum | None], Spectrum], speeds: Sequence[float], spectra: Sequence[Spectrum], m: int
-) -> list[float]:
-    """Speeds from where a vibration grows, each between two of the list: of one that is damped before, where it is damped no
-    more; of one that is not, where its growth is no rounding."""
+def _grown(speed: float, one: Spectrum, m: int) -> float:
+    """[1/s] beyond rounding."""
+    return _growth(speed, one, m) - GROWS * float(abs(one.values[m]))
 
-    def grown(speed: float, one: Spectrum, m: int) -> float:
-        return _growth(speed, one, m) - GROWS * float(abs(one.values[m]))
 
+def _limits(at: AtSpeed, rows: Sequence[Row], m: int) -> list[float]:
+    """Speeds from where a vibration grows, away from rest, each between two rows: of one that is damped before, where it is
+    damped no more; of one that is not, where its growth is no rounding."""
     found = []
-    for k, (one, next_) in enumerate(pairwise(spectra)):
-        low, high = grown(speeds[k], one, m), grown(speeds[k + 1], next_, m)
-        if low < 0 < high:
-            damped = _growth(speeds[k], one, m) < -GROWS * abs(one.values[m])
-            found += _crossings(at, speeds[k : k + 2], (one, next_), m, _growth if damped else grown)
+    for pair in pairwise(rows):
+        inner, outer = sorted(pair, key=lambda row: abs(row[0]))
+        if _grown(*inner, m) < 0 < _grown(*outer, m):
+            damped = _growth(*inner, m) < -GROWS * abs(inner[1].values[m])
+            found.append(_between(at, inner, outer, m, _growth if damped else _grown))
     return found
 
 
-def _crossings(
-    at: Callable[[float, Spectrum | None], Spectrum],
-    speeds: Sequence[float],
-    spectra: Sequence[Spectrum],
-    m: int,
-    measure: Measure,
-) -> list[float]:
-    """Speeds where a measure of a vibration is zero, each between two of the list."""
-    measured = [measure(speed, one, m) for speed, one in zip(speeds, spectra, strict=True)]
-    found = []
-    for k, (low, high) in enumerate(pairwise(measured)):
-        if low < 0 < high or low > 0 > high:
-            found.append(_between(at, (speeds[k], speeds[k + 1]), (low, high), spectra[k], m, measure))
-    return found
+def _crossings(at: AtSpeed, rows: Sequence[Row], m: int, measure: Measure) -> list[float]:
+    """Speeds where a measure of a vibration is zero: between two rows, or at one but rest, if its neighbours are not zero."""
+    measured = [measure(*row, m) for row in rows]
+    there = [k for k, value in enumerate(measured) if value]
+    found = [
+        rows[k][0] for k in (0, len(rows) - 1) if not measured[k] and rows[k][0] and measured[1 if k == 0 else k - 1]
+    ]
+    for k, next_ in pairwise(there):
+        if measured[k] * measured[next_] < 0:
+            found.append(_between(at, rows[k], rows[k + 1], m, measure) if next_ == k + 1 else rows[k + 1][0])
+    return sorted(found)
 
 
-def _between(
-    at: Callable[[float, Spectrum | None], Spectrum],
-    ends: tuple[float, float],
-    values: tuple[float, float],
-    near: Spectrum,
-    m: int,
-    measure: Measure,
-) -> float:
-    """By false position, of which a point that stays counts half (Illinois)."""
-    (a, b), (fa, fb) = ends, values
-    width, kept = b - a, 0
-    for _ in range(SECANTS):
-        c = b - fb * (b - a) / (fb - fa)
-        fc = measure(c, followed(near, at(c, near)), m)
-        if fc == 0 or abs(b - a) <= MET * width:
-            return c
-        if fc * fb < 0:
-            a, fa, kept = b, fb, 0
-        else:
-            fa, kept = (0.5 * fa if kept else fa), 1
-        step, b, fb = abs(c - b), c, fc
-        if step <= MET * width:
-            return c
-    return b
+def _between(at: AtSpeed, one: Row, other: Row, m: int, measure: Measure) -> float:
+    """By Brent's method, following the vibration from the nearest speed that is known."""
+    known = [one, other]
+
+    def measured(speed: float) -> float:
+        row = _row_at(at, known, speed)
+        known.append(row)
+        return measure(*row, m)
+
+    return float(brentq(measured, one[0], other[0], xtol=MET * abs(other[0] - one[0])))
 
 
 # ---- as a result ----------------------------------------------------------------------------------------------------

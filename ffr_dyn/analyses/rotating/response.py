@@ -20,6 +20,7 @@ from ffr_dyn.analyses.states import scene_at
 from ffr_dyn.analyses.static import static
 from ffr_dyn.linear.prescribed import prescribed
 from ffr_dyn.linear.transfer import Transfer, band, mean_square, transfer
+from ffr_dyn.linear.turned import Turned
 from ffr_dyn.results.file import save_result
 from ffr_dyn.results.result import Axis, Quantity, Result
 from ffr_dyn.scene.described import described
@@ -137,16 +138,17 @@ def response(
 
     The result has `frequency` [Hz], and of each output `gain`, `phase` [deg], `transfer` (real and imaginary), and `parts` of
     it by the modes that do most, named in the attribute "modes"; with a psd `density` and the attribute "rms",
-    of all of the noise, whatever frequencies are told.
+    of all of the noise, whatever frequencies are told, and of all frequencies at which an output answers.
 
         found = fd.response(scene, input="hinge.moment", outputs=("arm.tip.acceleration.y",))
         fd.draw_bode(found, "bode.png")
 
-    Raises InputError for inputs and outputs that do not exist.
+    Raises InputError for inputs and outputs that do not exist, negative frequencies, and a psd of fewer than two.
 
     >>> result = fd.response(scene, input="hinge.moment", outputs=["rod.tip.acceleration.y"], band_of=(1.0, 500.0))
     """
     require_scene(scene)
+    noise, asked = checked_noise(psd), _checked(frequencies, band_of)
     at = about_state(scene, about, time)
     acts = acting(at, input, time)
     names = (*components(acts.scene, outputs, time, "response"), *acts.moved)
@@ -154,20 +156,54 @@ def response(
     linear, envelopes = (linear, None) if acts.driver else seen_from_ground(linear, acts.scene, (acts.effort,), names)
     linear = _by_motion(linear, at, time) if acts.driver else _by_base(linear, acts)
     low, high = band_of if band_of else (None, None)
-    if psd and not band_of:
-        low, high = (min(f for f, _ in psd) or None), max(f for f, _ in psd)
-    f = np.array(frequencies, float) if len(frequencies) else band(linear.eigenvalues, low, high)
+    if noise.size and not band_of:
+        low, high = noise[0, 0] or None, noise[-1, 0]
+    f = asked if asked.size else band(linear.eigenvalues, low, high)
     if acts.order and not f.min() > 0:
         raise InputError(f"frequencies {list(frequencies)}: at 0 Hz a velocity has no displacement; give positive ones")
     found = transfer(linear.A, linear.B, linear.C, linear.D, f, PARTS, acts.order or 0)
     if envelopes is not None:
         linear = replace(linear, notes=(*linear.notes, *beside(envelopes, f[:: max(1, f.size // 50)], names)))
-    result = _as_result(
-        scene, linear, found, told(acts, input), np.array(psd, float).reshape(-1, 2), acts.order or 0, time
-    )
+    power = _mean_square(linear, envelopes, noise, acts.order or 0) if noise.size else None
+    result = _as_result(scene, linear, found, told(acts, input), noise, power, time)
     if path is not None:
         save_result(result, path)
     return result
+
+
+def checked_noise(psd: Sequence[tuple[float, float]]) -> Array:
+    """(K, 2) by rising frequency. InputError for what is no one-sided density over a range of frequencies."""
+    found = np.array(psd, float).reshape(-1, 2)
+    found = found[np.argsort(found[:, 0], kind="stable")]
+    if found.size and (not np.isfinite(found).all() or found.min() < 0 or not found[-1, 0] > found[0, 0]):
+        raise InputError(
+            f"psd {[tuple(row) for row in found.tolist()]}: give two frequencies [Hz] or more, none of them negative, each "
+            "with its one-sided density, such as (5, 1e-3) and (500, 1e-3); of a two-sided density twice as much"
+        )
+    return found
+
+
+def _checked(frequencies: Sequence[float], band_of: tuple[float, float] | None) -> Array:
+    """(F,) [Hz]. InputError for frequencies that are none, and for a band that does not rise from above zero."""
+    found = np.array(frequencies, float).ravel()
+    if not np.isfinite(found).all() or found.min(initial=0.0) < 0:
+        raise InputError(f"frequencies {list(frequencies)}: each must be finite and not negative [Hz]")
+    if band_of is not None:
+        band_in_words(f"{band_of[0]}..{band_of[1]}")
+    return found
+
+
+def _mean_square(linear: Linearisation, envelopes: Turned | None, noise: Array, order: int) -> Array:
+    """(O,) of the outputs under a noise, a mean over a turn: with what they answer beside the frequency of the input."""
+    own = mean_square(linear.A, linear.B, linear.C, linear.D, noise, order)
+    if envelopes is None:
+        return own
+    C, through = envelopes.beside
+    D = np.zeros((len(through), linear.B.shape[1]))
+    D[:, -1:] = through
+    sides = mean_square(linear.A, linear.B, C, D, noise, order)
+    found: Array = own + 2 * sides.reshape(-1, own.size).sum(axis=0)
+    return found
 
 
 def about_state(scene: Scene, about: About, time: float) -> Scene:
@@ -203,7 +239,7 @@ def _by_motion(free: Linearisation, held: Scene, time: float) -> Linearisation:
 
 
 def _as_result(
-    scene: Scene, linear: Linearisation, found: Transfer, words: str, psd: Array, order: int, time: float
+    scene: Scene, linear: Linearisation, found: Transfer, words: str, psd: Array, power: Array | None, time: float
 ) -> Result:
     outputs = Axis("of", tuple(name.replace(".", " ") for name in linear.outputs))
     names = _mode_names(linear, found)
@@ -220,12 +256,11 @@ def _as_result(
         split = np.stack([found.parts.real, found.parts.imag], axis=3)
         quantities["parts"] = Quantity(split, "1", (outputs, modes, parts), "transfer functions of single modes")
     more: dict[str, Any] = {}
-    if psd.size:
-        f, s = psd[np.argsort(psd[:, 0], kind="stable")].T
+    if power is not None:
+        f, s = psd.T
         density = np.abs(H) ** 2 * np.interp(found.frequencies, f, s, left=0.0, right=0.0)[:, None]
         quantities["density"] = Quantity(density, "1/Hz", (outputs,), "one-sided, of the output squared")
-        rms = np.sqrt(mean_square(linear.A, linear.B, linear.C, linear.D, psd, order))
-        more["rms"] = dict(zip(linear.outputs, rms.tolist(), strict=True))
+        more["rms"] = dict(zip(linear.outputs, np.sqrt(power).tolist(), strict=True))
     attributes = {
         **described(scene),
         "analysis": "frequency response",

@@ -46,3 +46,79 @@ def test_critical_speeds_do_not_depend_on_the_list_of_speeds():
     one, other = ({of["mode"]: of["speed"] for of in result.attributes["critical"]} for result in found)
     assert one == pytest.approx(other, rel=1e-6)
     assert len(one) == 2
+
+
+# ---- Jeffcott's rotor: a disc of 1 kg on a massless shaft that turns in a stiff bearing -----------------------------------
+
+
+def jeffcott(stiffness: tuple[float, float], damping: float = 0.0, outside: float = 0.0, **of) -> fd.Scene:
+    """Stiff along x and y of the shaft [N/m], damped within the shaft and from outside [N s/m]."""
+    name, x = of.get("name", ""), of.get("x", 0.0)
+    disc = fd.rigid_body(f"disc{name}", mass=1.0, inertia=(1e-3, 1e-3, 2e-3), points={"c": (0, 0, 0)})
+    hub = fd.rigid_body(f"hub{name}", mass=1.0, inertia=(1, 1, 1), points={"c": (0, 0, 0)})
+    place, marker, turns = (x, 0, 0), f"ground.O{name}", (0, 0, of.get("speed", 1.0))
+    shaft = fd.Bushing(
+        f"shaft{name}", f"hub{name}.c", f"disc{name}.c", (*stiffness, 1e6, 1e3, 1e3, 1e3), (damping,) * 2 + (0,) * 4
+    )
+    air = fd.Bushing(f"air{name}", marker, f"disc{name}.c", (0,) * 6, (outside,) * 2 + (0,) * 4)
+    return fd.Scene(
+        [fd.Body(hub.name, hub, position=place), fd.Body(disc.name, disc, position=place, omega_bar=turns)],
+        [fd.Joint(f"axle{name}", "revolute", marker, f"hub{name}.c", axis=(0, 0, 1))],
+        [fd.Driver("motor", f"axle{name}", fd.polynomial(0, 1.0))] if not of.get("geared") else [],
+        forces=[shaft, air] if outside else [shaft],
+        ground={f"O{name}": place},
+    )
+
+
+@pytest.mark.parametrize(
+    ("speeds", "criticals"),
+    [
+        ((0, 50, 100, 150), (100, 100)),
+        ((0, 100, 130, 150), (100, 100)),
+        ((80, 100), (100, 100)),
+        ((-150, -50, -10), (-100, -100)),
+        ((-150, -50, 0, 50, 150), (-100, -100, 100, 100)),
+    ],
+)
+def test_a_critical_speed_may_be_one_of_the_list_and_the_rotor_may_turn_backwards(speeds, criticals):
+    """Of the forward and the backward whirl of a disc on a round shaft: the root of stiffness over mass."""
+    found = fd.campbell(jeffcott((1e4, 1e4)), speeds=speeds, modes=2).attributes
+    assert sorted(one["speed"] for one in found["critical"]) == pytest.approx(criticals, rel=1e-8)
+    assert {one["axes"] for one in found["critical"]} == {"ground"}
+    assert sorted(name.rpartition(", ")[2] for name in found["names"]) == ["backward", "forward"]
+
+
+@pytest.mark.parametrize("speeds", [(0, 50, 150), (0, 50, 105, 150), (0, 90, 103, 107, 150), (90, 120), (-150, 0)])
+def test_a_flat_shaft_is_unstable_between_its_critical_speeds(speeds):
+    """The roots of both stiffnesses over the mass are the ends of the range; the backward whirl meets the order between."""
+    found = fd.campbell(jeffcott((1e4, 1.21e4)), speeds=speeds, modes=2).attributes
+    sign = 1 if speeds[-1] else -1
+    forward = sorted(abs(one["speed"]) for one in found["critical"] if one["mode"].endswith("forward"))
+    assert forward == pytest.approx([100, 110], rel=1e-7)
+    assert [one["speed"] for one in found["limits"]] == pytest.approx([sign * 100], rel=1e-7)
+    (backward,) = (one["speed"] for one in found["critical"] if one["mode"].endswith("backward"))
+    whirl = np.sqrt(np.roots([9, -5 * 2.21e4, 1.21e8]).max())  # (k1 - 5 w^2) (k2 - 5 w^2) = 16 w^4, of 1 kg
+    assert backward == pytest.approx(sign * whirl, rel=1e-7)
+
+
+@pytest.mark.parametrize("speeds", [(0, 100, 200, 300), (-300, -200, -100, 0)])
+def test_damping_within_the_shaft_is_unstable_from_the_same_speed_in_either_direction(speeds):
+    """The critical speed times one plus outer over inner damping."""
+    found = fd.campbell(jeffcott((1e4, 1e4), damping=2.0, outside=1.0), speeds=speeds, modes=2).attributes
+    (limit,) = found["limits"]
+    assert limit["speed"] == pytest.approx(150 * np.sign(sum(speeds)), rel=1e-7)
+
+
+@pytest.mark.parametrize("ratio", [3.0, -3.0])
+def test_a_rotor_that_is_geared_to_a_faster_one_has_its_own_critical_speed(ratio):
+    slow = jeffcott((1e4, 1e4), name="A")
+    fast = jeffcott((240.0**2, 240.0**2), name="B", x=1.0, speed=ratio, geared=True)
+    scene = fd.Scene(
+        (*slow.bodies, *fast.bodies), (*slow.joints, *fast.joints), slow.drivers,
+        couplings=[fd.Coupling("gear", "axleA.angle", "axleB.angle", ratio)], forces=(*slow.forces, *fast.forces),
+        ground={**slow.ground, **fast.ground},
+    )  # fmt: skip
+    found = fd.campbell(scene, speeds=(10, 40, 70, 130, 150), orders=(1, 3), modes=4).attributes["critical"]
+    told = sorted((one["order"], one["mode"][:5], one["speed"]) for one in found)
+    assert [one[:2] for one in told] == [(1, "discA")] * 2 + [(3, "discA")] * 2 + [(3, "discB")] * 2
+    assert [one[2] for one in told] == pytest.approx([100, 100, 100 / 3, 100 / 3, 80, 80], rel=1e-7)

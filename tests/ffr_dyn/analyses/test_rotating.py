@@ -396,6 +396,36 @@ def test_the_rms_is_that_of_the_whole_noise_whatever_frequencies_are_told():
     assert found.attributes["rms"]["m.R.x"] == pytest.approx(expected, rel=1e-5)
 
 
+@pytest.mark.parametrize(
+    "psd",
+    [
+        [(10, 1.0)],
+        [(10, 1), (10, 2)],
+        [(-20, 1), (20, 1)],
+        [(10, -1), (20, 1)],
+        [(10, float("nan")), (20, 1)],
+        [(0, 1)],
+    ],
+)
+def test_what_is_no_one_sided_density_is_refused(psd):
+    with pytest.raises(fp.InputError, match="two-sided density twice as much"):
+        fd.response(sprung_mass(2.0, 200.0, 3.0), input="rail.force", outputs=["m.R.x"], psd=psd)
+
+
+@pytest.mark.parametrize(
+    "how", [{"frequencies": [-1.0, 1.0]}, {"frequencies": [float("nan")]}, {"band_of": (0, 10)}, {"band_of": (10, 1)}]
+)
+def test_frequencies_that_are_none_are_refused(how):
+    with pytest.raises(fp.InputError, match="frequenc"):
+        fd.response(sprung_mass(2.0, 200.0, 3.0), input="rail.force", outputs=["m.R.x"], **how)
+
+
+def test_parts_of_what_only_decays_belong_to_the_sum():
+    found = fd.response(sprung_mass(2.0, 200.0, 100.0), input="rail.force", outputs=["m.R.x"], band_of=(0.1, 10))
+    assert found.attributes["modes"] == ["rail.stroke"] * 2
+    np.testing.assert_allclose(found["parts"].sum(axis=2)[:, 0], found["transfer"][:, 0], rtol=1e-9)
+
+
 def sprung_mass(m: float, k: float, c: float) -> fd.Scene:
     mass = fd.rigid_body("m", mass=m, inertia=(1, 1, 1), points={"c": (0, 0, 0)})
     rail = fd.Joint("rail", "translational", "ground.O", "m.c", axis=(1, 0, 0))

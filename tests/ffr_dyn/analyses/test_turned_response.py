@@ -55,3 +55,28 @@ def test_what_is_seen_in_turning_axes_has_other_frequencies_which_is_told():
         "disc.omega_bar.x also answers at the frequency of the input plus and minus multiples of 31.831 Hz"
     )
     assert note.endswith("not at its own")
+
+
+def test_the_rms_of_what_turns_is_that_of_all_frequencies_at_which_it_answers():
+    """A force along x at the middle of a rotor that does not tilt: of what is seen along an axis of the rotor the rms is
+    that along x over the root of two, as it is along x half of the time and across it the other half."""
+    disc = fd.rigid_body("disc", mass=1.0, inertia=(1e-3, 1e-3, 2e-3), points={"c": (0, 0, 0)})
+    hub = fd.rigid_body("hub", mass=1.0, inertia=(1, 1, 1), points={"c": (0, 0, 0)})
+    scene = fd.Scene(
+        [fd.Body("hub", hub), fd.Body("disc", disc, omega_bar=(0, 0, 60.0))],
+        [fd.Joint("axle", "revolute", "ground.O", "hub.c", axis=(0, 0, 1))],
+        [fd.Driver("motor", "axle", fd.polynomial(0.0, 60.0))],
+        forces=[
+            fd.Bushing("shaft", "hub.c", "disc.c", (1e4, 1e4, 1e6, 1e3, 1e3, 1e3)),
+            fd.Bushing("air", "ground.O", "disc.c", (0,) * 6, (4.0, 4.0, 0, 0, 0, 0)),
+        ],
+        ground={"O": (0, 0, 0)},
+    )  # fmt: skip
+    for input, psd in (("disc.c.force.x", ((1, 1e-2), (60, 1e-2))), ("base.x.displacement", ((1, 1e-6), (60, 1e-7)))):
+        outputs = ["shaft.displacement.x", "disc.c.position.x", "hub.c.position.x"]
+        rms = fd.response(scene, input=input, outputs=outputs, psd=psd, about="steady").attributes["rms"]
+        f = np.linspace(1, 60, 200001)
+        push = 1.0 if input.startswith("disc") else (2 * np.pi * f) ** 2
+        H = push / (1e4 - (2 * np.pi * f) ** 2 + 4.0j * 2 * np.pi * f)
+        along = np.sqrt(np.trapezoid(np.abs(H) ** 2 * np.interp(f, *np.transpose(psd)), f))
+        assert rms["shaft.displacement.x"] == pytest.approx(along / np.sqrt(2), rel=1e-6)
