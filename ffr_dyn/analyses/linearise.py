@@ -34,7 +34,7 @@ from ffr_dyn.linear.matrices import Modes, modes_of, reduced
 from ffr_dyn.linear.matrices import state_matrix as steady_matrix
 from ffr_dyn.linear.prestrained import prestrained, told
 from ffr_dyn.linear.spectrum import main_parts, rates_of
-from ffr_dyn.linear.steady_state import Steady, screws_of, steady_here
+from ffr_dyn.linear.steady_state import TURNED, Steady, carried, screws_of, steady_here
 from ffr_dyn.linear.whirl import damping_ratios, ways_of, whirls
 from ffr_dyn.linear.words import in_words
 from ffr_dyn.results.file import save_result
@@ -49,6 +49,7 @@ from ffr_prep.common.errors import ComputationError, InputError
 
 SHOWN = 12  # modes that a command prints
 BASE = {"base.x": 0, "base.y": 1, "base.z": 2}  # inputs: accelerations of the ground
+SAME = 1e-6  # of matrices at two angles of a steady motion, relative
 STATIONARY = 1e-6  # of the accelerations in moving axes, relative to those of the applied forces
 
 
@@ -190,6 +191,9 @@ def linearise(
 ) -> Linearisation:
     """Linearise a scene about its assembled state at `time` [s], its drivers' positions and rates being those of the time.
 
+    About a steady motion inputs and outputs that do not turn with the bodies are those of this moment, which a note tells;
+    `response` takes them over the turn.
+
     inputs  : efforts, names of loads of the scene (an input of one doubles the load), or "base.x", "base.y", "base.z", an
               acceleration of the ground, to whose frame all outputs refer
     outputs : names of components of a result, such as "rod.tip.position.y"
@@ -199,6 +203,14 @@ def linearise(
 
     >>> found = fd.linearise(scene, inputs=(fd.JointEffort("torque", "hinge"),), outputs=("rod.tip.position.y",))
     """
+    found = linearised(scene, time, inputs, outputs)
+    return replace(found, notes=(*found.notes, *_of_this_moment(found, scene, inputs)))
+
+
+def linearised(
+    scene: Scene, time: float, inputs: tuple[Effort | str, ...] = (), outputs: tuple[str, ...] = ()
+) -> Linearisation:
+    """As `linearise`, whatever turns."""
     several("inputs", inputs, (*get_args(Effort), str)), several("outputs", outputs, (str,))
     fed = with_units(in_space(scene), _efforts(inputs))
     assembled = assemble(fed, time=time)
@@ -222,7 +234,7 @@ def linearise(
     evaluate(at, time, assembled.x, assembled.v)
     unit = main_parts(parts) / np.sqrt(np.maximum((np.abs(solved.parts) ** 2).sum(axis=(0, 1)), 1e-300))
     strained = prestrained(*where, assembled.x, solved.values, unit)
-    notes = (*assembled.notes, *_notes(near, steady), *checked("linearise", assembled, at.record))
+    notes = (*assembled.notes, *_notes(near, steady, solved.values), *checked("linearise", assembled, at.record))
     notes = (*notes, *told(strained, leading[strained.mode]))
     driven = tuple(driver.name for driver in scene.drivers)
     return Linearisation(
@@ -265,16 +277,38 @@ def _solved(near: Chart, steady: Steady | None) -> tuple[Array, float, Modes]:
     return A, error, Modes(values[order], vectors[None, :d, order], 0, 0.0)
 
 
-def _notes(near: Chart, steady: Steady | None) -> list[str]:
+def _notes(near: Chart, steady: Steady | None, values: Array) -> list[str]:
     if steady is not None:
         return list(steady.notes)
     at, place = near.at, near.at.system.layout
     v = to_global_axes(place, near.x, near.V)
     left = near.Z @ rates(near, near.x, v)[near.steps.size :] / sizes(at)
     applied = np.linalg.solve(near.M, evaluate(at, near.time, near.x, v).force) / sizes(at)
-    if np.abs(left).max() <= STATIONARY * max(1e-9, float(np.abs(applied).max()), float(np.abs(near.V).max()) ** 2):
+    rounding = 1e-9 * max(1.0, float(np.abs(values).max(initial=0.0)) ** 2)  # of springs that are not stretched
+    if np.abs(left).max() <= STATIONARY * max(rounding, float(np.abs(applied).max()), float(np.abs(near.V).max()) ** 2):
         return []
     return ["the state is no equilibrium and no steady rotation: the eigenvalues describe its next moment only"]
+
+
+def _of_this_moment(found: Linearisation, scene: Scene, inputs: tuple[Effort | str, ...]) -> list[str]:
+    """A note on inputs and outputs that change as a steady motion goes on."""
+    near = found.near
+    steady = steady_about(near, inputs) if found.B.size or found.C.size else None
+    if steady is None or not steady.machine.screws.fastest:
+        return []
+    screws = steady.machine.screws
+    later = TURNED / screws.fastest
+    there = replace(near, time=near.time + later, x=carried(near.at.system.layout, screws, near.x, later))
+    again = inputs_and_outputs(there, scene, inputs, found.outputs)
+    before = (found.B, found.C, found.D)
+    if all(
+        np.abs(b - a).max(initial=0.0) <= SAME * np.abs(a).max(initial=0.0) for a, b in zip(before, again, strict=True)
+    ):
+        return []
+    return [
+        "inputs or outputs change with the angle of what turns: B, C and D are those of this moment; `response` takes them "
+        "over the turn"
+    ]
 
 
 # ---- inputs and outputs ----------------------------------------------------------------------------------------------
@@ -346,8 +380,11 @@ def _output_matrices(
         x, v = state(chart, deviation[:d], deviation[d:])
         evaluate(chart.at, chart.time, x, v)
         result = result_of(chart.at.system, chart.at.record, {}, outputs=("default", *quantities))
-        return np.array([_scalar(result, name) for name in outputs])
+        values = np.array([_scalar(result, name) for name in outputs])
+        return values - 2 * np.pi * turns * np.round((values - here) / (2 * np.pi))
 
+    turns, here = np.array([name.endswith(".angle") for name in outputs]), np.zeros(len(outputs))
+    here = measured(near, np.zeros(2 * d))  # angles are told within half a turn; these go on from here
     C, _ = derivative(lambda deviation: measured(near, deviation), np.concatenate([near.steps, near.steps]))
     return C, _columns(lambda u: measured(_fed(near, scene, inputs, u), np.zeros(2 * d)), len(inputs))
 

@@ -32,7 +32,12 @@ class OverTurn:
 
     @property
     def varies(self) -> bool:
-        return bool(self.A[1:].any()) or any(_there(one)[-1:] > [0] for one in (self.B, self.C, self.D))
+        return not self.input_turns or any(_there(one)[-1:] > [0] for one in (self.C, self.D))
+
+    @property
+    def input_turns(self) -> bool:
+        """Whether all but the outputs is the same at every angle."""
+        return not self.A[1:].any() and not _there(self.B)[-1:] > [0]
 
 
 @dataclass(frozen=True)

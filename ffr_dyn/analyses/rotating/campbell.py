@@ -17,7 +17,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from ffr_dyn.analyses.registry import OfMoment, option
-from ffr_dyn.analyses.rotating.steady import GROWS, SPEEDS, TURN, distinct, growing
+from ffr_dyn.analyses.rotating.steady import SPEEDS, TURN, distinct, growing, rounding
 from ffr_dyn.analyses.settings import MomentSettings
 from ffr_dyn.consistency.assemble import assemble, in_space
 from ffr_dyn.linear.prestrained import told
@@ -224,7 +224,7 @@ def _growth(speed: float, one: Spectrum, m: int) -> float:
 
 def _grown(speed: float, one: Spectrum, m: int) -> float:
     """[1/s] beyond rounding."""
-    return _growth(speed, one, m) - GROWS * float(abs(one.values[m]))
+    return _growth(speed, one, m) - float(rounding(one)[m])
 
 
 def _limits(at: AtSpeed, rows: Sequence[Row], m: int) -> list[float]:
@@ -234,7 +234,7 @@ def _limits(at: AtSpeed, rows: Sequence[Row], m: int) -> list[float]:
     for pair in pairwise(rows):
         inner, outer = sorted(pair, key=lambda row: abs(row[0]))
         if _grown(*inner, m) < 0 < _grown(*outer, m):
-            damped = _growth(*inner, m) < -GROWS * abs(inner[1].values[m])
+            damped = _growth(*inner, m) < -rounding(inner[1])[m]
             found.append(_between(at, inner, outer, m, _growth if damped else _grown))
     return found
 

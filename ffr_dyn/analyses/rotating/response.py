@@ -10,17 +10,16 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from ffr_dyn.analyses.efforts import Effort
-from ffr_dyn.analyses.linearise import Linearisation, linearise
+from ffr_dyn.analyses.linearise import Linearisation, linearised
 from ffr_dyn.analyses.registry import OfMoment, option
 from ffr_dyn.analyses.rotating.inputs import Acting, absolute_order, acting, components, told
-from ffr_dyn.analyses.rotating.seen_from_ground import beside, seen_from_ground
+from ffr_dyn.analyses.rotating.seen_from_ground import Sides, beside, outputs_over_turn, seen_from_ground
 from ffr_dyn.analyses.rotating.steady import steady
 from ffr_dyn.analyses.settings import MomentSettings
 from ffr_dyn.analyses.states import scene_at
 from ffr_dyn.analyses.static import static
 from ffr_dyn.linear.prescribed import prescribed
 from ffr_dyn.linear.transfer import Transfer, band, mean_square, transfer
-from ffr_dyn.linear.turned import Turned
 from ffr_dyn.results.file import save_result
 from ffr_dyn.results.result import Axis, Quantity, Result
 from ffr_dyn.scene.described import described
@@ -152,9 +151,10 @@ def response(
     at = about_state(scene, about, time)
     acts = acting(at, input, time)
     names = (*components(acts.scene, outputs, time, "response"), *acts.moved)
-    linear = linearise(acts.scene, time=time, inputs=(acts.effort,), outputs=names)
-    linear, envelopes = (linear, None) if acts.driver else seen_from_ground(linear, acts.scene, (acts.effort,), names)
-    linear = _by_motion(linear, at, time) if acts.driver else _by_base(linear, acts)
+    linear = linearised(acts.scene, time, (acts.effort,), names)
+    over_turn = outputs_over_turn if acts.driver else seen_from_ground
+    linear, sides = over_turn(linear, acts.scene, (acts.effort,), names)
+    linear, sides = _by_motion(linear, sides, at, time) if acts.driver else _by_base(linear, sides, acts)
     low, high = band_of if band_of else (None, None)
     if noise.size and not band_of:
         low, high = noise[0, 0] or None, noise[-1, 0]
@@ -162,9 +162,10 @@ def response(
     if acts.order and not f.min() > 0:
         raise InputError(f"frequencies {list(frequencies)}: at 0 Hz a velocity has no displacement; give positive ones")
     found = transfer(linear.A, linear.B, linear.C, linear.D, f, PARTS, acts.order or 0)
-    if envelopes is not None:
-        linear = replace(linear, notes=(*linear.notes, *beside(envelopes, f[:: max(1, f.size // 50)], names)))
-    power = _mean_square(linear, envelopes, noise, acts.order or 0) if noise.size else None
+    if sides is not None:
+        some = f[:: max(1, f.size // 50)]
+        linear = replace(linear, notes=(*linear.notes, *beside(linear, sides, some, linear.outputs, acts.order or 0)))
+    power = _mean_square(linear, sides, noise, acts.order or 0) if noise.size else None
     result = _as_result(scene, linear, found, told(acts, input), noise, power, time)
     if path is not None:
         save_result(result, path)
@@ -193,16 +194,13 @@ def _checked(frequencies: Sequence[float], band_of: tuple[float, float] | None) 
     return found
 
 
-def _mean_square(linear: Linearisation, envelopes: Turned | None, noise: Array, order: int) -> Array:
+def _mean_square(linear: Linearisation, sides: Sides | None, noise: Array, order: int) -> Array:
     """(O,) of the outputs under a noise, a mean over a turn: with what they answer beside the frequency of the input."""
     own = mean_square(linear.A, linear.B, linear.C, linear.D, noise, order)
-    if envelopes is None:
+    if sides is None:
         return own
-    C, through = envelopes.beside
-    D = np.zeros((len(through), linear.B.shape[1]))
-    D[:, -1:] = through
-    sides = mean_square(linear.A, linear.B, C, D, noise, order)
-    found: Array = own + 2 * sides.reshape(-1, own.size).sum(axis=0)
+    more = mean_square(linear.A, linear.B, sides.C, sides.D, noise, order)
+    found: Array = own + 2 * more.reshape(-1, own.size).sum(axis=0)
     return found
 
 
@@ -215,27 +213,39 @@ def about_state(scene: Scene, about: About, time: float) -> Scene:
     return scene_at(scene, static(scene, time=time) if about == "equilibrium" else steady(scene, time=time))
 
 
-def _by_base(linear: Linearisation, acts: Acting) -> Linearisation:
+def _by_base(linear: Linearisation, sides: Sides | None, acts: Acting) -> tuple[Linearisation, Sides | None]:
     """With what the base itself adds to outputs that are absolute: of its acceleration to accelerations alone; of its
     displacement and velocity B and D of the displacement and its two derivatives."""
     orders = [absolute_order(acts.effort, name) for name in linear.outputs]
     added = np.array([[float(order == k) for k in range(3)] for order in orders]).reshape(-1, 3)
     if acts.order is None:
-        return replace(linear, D=linear.D + added[:, 2:])
-    B, D = np.zeros((len(linear.A), 3)), added
-    B[:, 2:], D[:, 2:] = linear.B, added[:, 2:] + linear.D
-    return replace(linear, B=B, D=D)
+        return replace(linear, D=linear.D + added[:, 2:]), sides
+    B, D = _last_of_three(linear.B), added + _last_of_three(linear.D)
+    return replace(linear, B=B, D=D), sides and replace(sides, D=_last_of_three(sides.D))
 
 
-def _by_motion(free: Linearisation, held: Scene, time: float) -> Linearisation:
+def _last_of_three(column: Array) -> Array:
+    return np.hstack([np.zeros((len(column), 2)), column])
+
+
+def _by_motion(
+    free: Linearisation, sides: Sides | None, held: Scene, time: float
+) -> tuple[Linearisation, Sides | None]:
     """The scene under the motion of a driver, from that without the driver, whose coordinate is its last output: B and D of
     the motion and its two derivatives."""
-    A, B, C, D = prescribed(free.A, free.B, free.C[:-1], free.D[:-1], free.C[-1])
-    own, words = np.zeros(0, complex), tuple[str, ...]()
+    seen, through = [free.C[:-1]], [free.D[:-1]]
+    if sides is not None:
+        own = np.arange(len(sides.C)) % len(free.C) < len(free.C) - 1
+        seen, through = [*seen, sides.C[own]], [*through, sides.D[own]]
+    A, B, C, D = prescribed(free.A, free.B, np.concatenate(seen), np.concatenate(through), free.C[-1])
+    first = len(free.C) - 1
+    sides = sides and Sides(C[first:], D[first:], sides.rate)
+    values, words = np.zeros(0, complex), tuple[str, ...]()
     if len(A):
-        of_held = linearise(held, time=time)
-        own, words = of_held.eigenvalues, of_held.leading
-    return replace(free, A=A, B=B, C=C, D=D, eigenvalues=own, leading=words, outputs=free.outputs[:-1])
+        of_held = linearised(held, time)
+        values, words = of_held.eigenvalues, of_held.leading
+    outputs = free.outputs[:-1]
+    return replace(free, A=A, B=B, C=C[:first], D=D[:first], eigenvalues=values, leading=words, outputs=outputs), sides
 
 
 def _as_result(

@@ -19,7 +19,7 @@ from ffr_dyn.analyses.settings import MomentSettings
 from ffr_dyn.consistency.assemble import Assembled, assemble, in_space
 from ffr_dyn.consistency.doubts import checked
 from ffr_dyn.consistency.evaluation import evaluator, joined, record_states
-from ffr_dyn.linear.spectrum import spectrum
+from ffr_dyn.linear.spectrum import Spectrum, spectrum
 from ffr_dyn.linear.speeds import at_speed, speed_list
 from ffr_dyn.linear.steady_state import Steady as Found
 from ffr_dyn.linear.steady_state import steady_state
@@ -27,9 +27,10 @@ from ffr_dyn.results.quantities import selected
 from ffr_dyn.results.result import Quantity, Result
 from ffr_dyn.scene.described import described
 from ffr_dyn.scene.scene import Scene, require_scene
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.progress import no_count
 
-GROWS = 1e-7  # of a real part relative to the eigenvalue: what is no rounding
+GROWS = 1e-7  # of a real part relative to the eigenvalue, or the speed: what is no rounding
 TURN = option("--turn", "What has the speed: a driver, or a joint coordinate such as hinge.angle.", metavar="NAME")
 SPEEDS = option("--speed", "Speed: 314 [rad/s], '3000 rpm', 0..500, '0..6000 rpm:13'; repeat.", metavar="SPEED")
 
@@ -127,10 +128,16 @@ def _number(text: str) -> float:
     return float(text.split()[0]) if text else 0.0
 
 
+def rounding(one: Spectrum) -> Array:
+    """(m,) [1/s] of real parts: of a whirl that stands still in the turning axes beside the speed of its body."""
+    found: Array = GROWS * np.maximum(np.maximum(np.abs(one.values), one.speed), 1e-300)
+    return found
+
+
 def growing(found: Found) -> str:
     """The unstable modes about a steady motion, in words; "" where there are none."""
     one = spectrum(found)
-    faster = one.values.real > GROWS * np.maximum(np.abs(one.values), 1e-300)
+    faster = one.values.real > rounding(one)
     if not faster.any():
         return ""
     k = int(np.argmax(np.where(faster, one.values.real, -np.inf)))

@@ -14,6 +14,7 @@ from test_quasi_static import rotor
 from ffr_dyn.analyses.efforts import JointEffort, MarkerEffort, recorded, with_effort
 from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.analyses.linearise import as_result, linearise, table_of_modes
+from ffr_dyn.analyses.rotating.response import response
 from ffr_dyn.analyses.states import scene_at
 from ffr_dyn.analyses.static import static
 from ffr_dyn.consistency.assemble import assemble
@@ -22,7 +23,7 @@ from ffr_dyn.functions.time_functions import polynomial
 from ffr_dyn.integrators import RK4
 from ffr_dyn.results.file import load_result, save_result
 from ffr_dyn.scene.drivers import Driver
-from ffr_dyn.scene.forces import Load, SpringDamper
+from ffr_dyn.scene.forces import JointSpring, Load, SpringDamper
 from ffr_dyn.scene.joints import Joint
 from ffr_dyn.scene.scene import Body, Scene
 from ffr_dyn.scene.sensors import Measurement
@@ -210,3 +211,26 @@ def test_an_input_has_no_stiffness_of_its_own():
     scene = rotor(0.0, stiffening=True)
     plain, fed = (linearise(scene, inputs=inputs) for inputs in ((), (MarkerEffort("push", "rod.b", (0, 1.0, 0)),)))
     np.testing.assert_array_equal(fed.A, plain.A)
+
+
+@pytest.mark.parametrize("angle", [0.0, 3.0, np.pi - 1e-7, np.pi])
+def test_an_angle_of_half_a_turn_is_an_output_like_others(angle):
+    """Of a pendulum of 2 kg, 0.5 m below its hinge, whose joint is drawn at an angle."""
+    bar = rigid_body("bar", mass=2.0, inertia=(0.1,) * 3, points={"h": (0, 0, 0)}, centre_of_mass=(0, -0.5, 0))
+    c, s = np.cos(angle), np.sin(angle)
+    hinge = Joint("hinge", "revolute", "ground.o", "bar.h", axis=np.eye(3), axis_j=[[c, -s, 0], [s, c, 0], [0, 0, 1]])
+    scene = Scene([Body("bar", bar)], [hinge], ground={"o": (0, 0, 0)}, gravity=(0, -9.81, 0))
+    f = np.array([0.1, 1.0])
+    found = response(scene, input="hinge.moment", outputs=["hinge.angle"], frequencies=f)
+    expected = 1 / (9.81 - 0.6 * (2 * np.pi * f) ** 2)
+    np.testing.assert_allclose(found["transfer"][:, 0, 0], expected, rtol=1e-7)
+
+
+def test_a_spring_that_is_not_stretched_but_by_rounding_is_an_equilibrium():
+    bar = rigid_body("bar", mass=2.0, inertia=(0.1,) * 3, points={"h": (0, 0, 0)})
+    hinge = Joint("hinge", "revolute", "ground.o", "bar.h")
+    spring = JointSpring("spring", "hinge", stiffness=5e4, free=0.3)
+    scene = Scene([Body("bar", bar, rotation=(0, 0, 0.3))], [hinge], forces=[spring], ground={"o": (0, 0, 0)})
+    assert not linearise(scene).notes
+    away = replace(scene, forces=[replace(spring, free=0.3 + 1e-6)])
+    assert "no equilibrium" in linearise(away).notes[0]

@@ -109,6 +109,12 @@ def test_damping_within_the_shaft_is_unstable_from_the_same_speed_in_either_dire
     assert limit["speed"] == pytest.approx(150 * np.sign(sum(speeds)), rel=1e-7)
 
 
+@pytest.mark.parametrize("stiffness", [(1e4, 1e4), (1e4, 1.21e4)])
+def test_an_undamped_rotor_is_not_unstable_by_rounding_where_it_stands_still(stiffness):
+    assert fd.steady(jeffcott(stiffness), speeds=(100.0,)).attributes["stable"]
+    assert not fd.steady(jeffcott((1e4, 1.21e4)), speeds=(105.0,)).attributes["stable"]
+
+
 @pytest.mark.parametrize("ratio", [3.0, -3.0])
 def test_a_rotor_that_is_geared_to_a_faster_one_has_its_own_critical_speed(ratio):
     slow = jeffcott((1e4, 1e4), name="A")

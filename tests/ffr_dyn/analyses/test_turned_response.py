@@ -80,3 +80,49 @@ def test_the_rms_of_what_turns_is_that_of_all_frequencies_at_which_it_answers():
         H = push / (1e4 - (2 * np.pi * f) ** 2 + 4.0j * 2 * np.pi * f)
         along = np.sqrt(np.trapezoid(np.abs(H) ** 2 * np.interp(f, *np.transpose(psd)), f))
         assert rms["shaft.displacement.x"] == pytest.approx(along / np.sqrt(2), rel=1e-6)
+
+
+def spun(speed: float) -> fd.Scene:
+    """A disc on a motor's hub, soft about the axis, with a point on its rim."""
+    disc = fd.rigid_body("disc", mass=1.0, inertia=(1e-3, 1e-3, 2e-3), points={"c": (0, 0, 0), "rim": (0.1, 0, 0)})
+    hub = fd.rigid_body("hub", mass=1.0, inertia=(1, 1, 1), points={"c": (0, 0, 0)})
+    return fd.Scene(
+        [fd.Body("hub", hub), fd.Body("disc", disc, omega_bar=(0, 0, speed))],
+        [fd.Joint("axle", "revolute", "ground.O", "hub.c", axis=(0, 0, 1))],
+        [fd.Driver("motor", "axle", fd.polynomial(0.0, speed))],
+        forces=[fd.Bushing("shaft", "hub.c", "disc.c", (1e4, 1e4, 1e6, 1e3, 1e3, 1e3), (4, 4, 0, 0.1, 0.1, 0.5))],
+        ground={"O": (0, 0, 0)},
+    )
+
+
+@pytest.mark.parametrize("speed", [60.0, -60.0])
+def test_what_a_motor_shakes_is_seen_from_the_ground_at_other_frequencies(speed):
+    """The disc follows the angle of the motor by T; a point of its rim moves along y by r cos(W t) T, half of the time."""
+    f, noise = np.array([2.0, 80.0, 112.0]), ((1, 1e-4), (200, 1e-4))
+    outputs = ["disc.omega_bar.z", "axle.angle", "disc.rim.position.y"]
+    how = {"outputs": outputs, "frequencies": f, "about": "steady", "psd": noise}
+    found = fd.response(spun(speed), input="motor.angle", **how)
+
+    def follows(f):
+        s = 2j * np.pi * f
+        return (0.5 * s + 1e3) / (2e-3 * s**2 + 0.5 * s + 1e3)
+
+    H = found["transfer"] @ np.array([1, 1j])
+    np.testing.assert_allclose(H[:, 0], 2j * np.pi * f * follows(f), rtol=1e-8)
+    np.testing.assert_allclose(H[:, 1], 1.0, rtol=1e-9)
+    assert found["gain"][:, 2].max() < 1e-9
+    (note,) = (note for note in found.attributes["notes"] if "also answers" in note)
+    assert note.startswith("disc.rim.position.y")
+    many = np.linspace(1, 200, 100001)
+    rms = 0.1 * np.sqrt(0.5 * np.trapezoid(np.abs(follows(many)) ** 2 * 1e-4, many))
+    assert found.attributes["rms"]["disc.rim.position.y"] == pytest.approx(rms, rel=1e-6)
+
+
+def test_matrices_of_one_moment_of_a_turn_say_so():
+    scene = fd.scene_at(spun(60.0), fd.steady(spun(60.0)))
+    push = fd.MarkerEffort("push", "disc.c", (1, 0, 0))
+    found = fd.linearise(scene, inputs=(push,), outputs=("disc.c.position.x",))
+    assert any("B, C and D are those of this moment" in note for note in found.notes)
+    assert not fd.linearise(scene, outputs=("disc.omega_bar.z",)).notes
+    still = fd.linearise(spun(0.0), inputs=(push,), outputs=("disc.c.position.x",))
+    assert not any("of this moment" in note for note in still.notes)
