@@ -10,13 +10,14 @@ Control of Linear Periodically Time Varying Systems, ch. 3: harmonic transfer fu
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ffr_prep.common.arrays import Array
 
 PRESENT = 1e-7  # of a harmonic relative to the largest of its kind: no rounding
+SETTLED, MOST = 1e-8, 2000  # of answers that more harmonics do not change, relative; states, from where none are added
 
 
 @dataclass(frozen=True)
@@ -43,7 +44,8 @@ class OverTurn:
 @dataclass(frozen=True)
 class Turned:
     """The system of the envelopes: A, B, C, D, real; the numbers of the harmonics in it, and their rate [rad/s]; and what
-    makes the sidebands of its outputs, real and imaginary parts of C_(k-n) and D_k for k = 1 ... H in turn."""
+    makes the sidebands of its outputs, real and imaginary parts of C_(k-n) and D_k for k = 1 ... in turn. `left` is how much
+    more harmonics than these change the answers, relative."""
 
     A: Array
     B: Array
@@ -52,23 +54,52 @@ class Turned:
     numbers: tuple[int, ...]
     rate: float
     beside: tuple[Array, Array]
+    left: float = 0.0
 
 
 def turned(of: OverTurn) -> Turned:
-    """Of all harmonics that the input reaches."""
-    numbers, S, most = _reached(of), of.A.shape[1], len(of.A) - 1
+    """Of all harmonics that the input reaches. Where A varies they are as many as change what is answered: a rotor that is
+    not round in supports that are not alike has all of them."""
+    furthest = len(of.A) - 1
+    found = _up_to(of, furthest)
+    spread = [k for k in range(1, len(of.A)) if of.A[k].any()]
+    if not spread:
+        return found
+    found = replace(found, left=np.inf)
+    while found.left > SETTLED and (len(found.A) <= MOST or found.left == np.inf):
+        furthest += max(spread)
+        more = _up_to(of, furthest)
+        left = _changed(found, more)
+        found = replace(found if left <= SETTLED else more, left=left)
+    return found
+
+
+def _up_to(of: OverTurn, furthest: int) -> Turned:
+    numbers, S = _reached(of, furthest), of.A.shape[1]
     A = np.block([[_part(of.A, n - j) for j in numbers] for n in numbers]).astype(complex)
     A -= np.diag(np.repeat([1j * n * of.rate for n in numbers], S))
     B = np.concatenate([_part(of.B, n) for n in numbers])
     to_real = _real_parts(numbers, S)
     back = np.linalg.inv(to_real)
     C = np.concatenate([_part(of.C, -n) for n in numbers], axis=1) @ back
-    beside = [np.concatenate([_part(of.C, k - n) for n in numbers], axis=1) @ back for k in range(1, most + 1)]
+    there = range(1, furthest + 1)
+    beside = [np.concatenate([_part(of.C, k - n) for n in numbers], axis=1) @ back for k in there]
     sides = np.concatenate([part for one in beside for part in (one.real, one.imag)])
-    through = np.concatenate([part for one in of.D[1:] for part in (one.real, one.imag)])
-    return Turned(
-        (to_real @ A @ back).real, (to_real @ B).real, C.real, of.D[0].real, tuple(numbers), of.rate, (sides, through)
+    through = np.concatenate([part for k in there for part in (_part(of.D, k).real, _part(of.D, k).imag)])
+    A, B = (to_real @ A @ back).real, (to_real @ B).real
+    return Turned(A, B, C.real, of.D[0].real, tuple(numbers), of.rate, (sides, through))
+
+
+def _changed(few: Turned, many: Turned) -> float:
+    """How much the answers of two systems differ, relative to the largest, near the frequencies of the first."""
+    own = np.unique(np.round(np.abs(np.linalg.eigvals(few.A)), 6))
+    at = (0.02 + 1j) * own[own > 0][:: max(1, own.size // 16)]
+    one, other = (
+        np.array([of.C @ np.linalg.solve(s * np.eye(len(of.A)) - of.A, of.B) for s in at]) for of in (few, many)
     )
+    sizes = np.abs(other).max(axis=(0, 2), initial=0.0)
+    least = 1e-300 + 1e-9 * sizes.max(initial=0.0)
+    return float((np.abs(one - other).max(axis=(0, 2), initial=0.0) / np.maximum(sizes, least)).max(initial=0.0))
 
 
 def _part(of: Array, k: int) -> Array:
@@ -82,10 +113,9 @@ def _there(of: Array) -> list[int]:
     return [k for k in range(len(of)) if sizes[k] > PRESENT * sizes.max()]
 
 
-def _reached(of: OverTurn) -> list[int]:
-    """Harmonics n of the states, with their negatives, that inputs excite, and what varies spreads to."""
-    most = len(of.A) - 1
-    found, spread = set(_there(of.B)) or {0}, [k for k in range(1, most + 1) if of.A[k].any()]
+def _reached(of: OverTurn, most: int) -> list[int]:
+    """Harmonics n of the states, with their negatives, that inputs excite, and what varies spreads to, as far as `most`."""
+    found, spread = set(_there(of.B)) or {0}, [k for k in range(1, len(of.A)) if of.A[k].any()]
     for _ in range(2 * most):
         found |= {abs(n + sign * k) for n in found for k in spread for sign in (1, -1) if abs(n + sign * k) <= most}
     return sorted({sign * n for n in found for sign in (1, -1)})

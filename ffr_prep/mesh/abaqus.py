@@ -106,8 +106,11 @@ def keyword_sections(path: Path, above: tuple[Path, ...] = ()) -> Iterator[tuple
     if path.resolve() in above:
         raise InputError(f"it includes itself: {' -> '.join(one.name for one in (*above, path))}")
     for block in re.split(r"^\*(?!\*)", _without_comments(path), flags=re.MULTILINE)[1:]:
-        header, _, data = re.sub(r",[ \t]*\n[ \t]*(?=[A-Za-z ]+=)", ",", block, count=1).partition("\n")
-        keyword, *settings = (word.strip() for word in header.split(","))
+        header, _, data = block.partition("\n")
+        while header.rstrip().endswith(",") and re.match(r"[ \t]*[A-Za-z ]+=", data):
+            more, _, data = data.partition("\n")
+            header += more
+        keyword, *settings = (" ".join(word.split()) for word in header.split(","))
         pairs = (setting.partition("=") for setting in settings)
         parameters = {name.strip().upper(): value.strip().strip('"') for name, _, value in pairs}
         if keyword.upper() == "INCLUDE":

@@ -17,6 +17,11 @@ from ffr_dyn.linear.turned import OverTurn, turned
 from ffr_dyn.scene.scene import Scene
 from ffr_prep.common.arrays import Array
 
+TOLD = 1e-4  # of answers that more harmonics would change, relative
+CUT = (
+    "what turns and its supports change so much with the angle that more harmonics than there is room for change the "
+    "answers, by {:.2g} of the largest: take bodies with fewer modes"
+)
 LEAST = 1e-6  # of an answer, relative: no rounding
 MOMENT = "inputs or supports change with the angle of what turns: they are taken as they are at this moment"
 SEVERAL = (
@@ -49,6 +54,8 @@ def seen_from_ground(
     values = np.concatenate([linear.eigenvalues[linear.free :] + 1j * n * of.rate for n in system.numbers])
     names = linear.leading[linear.free :] * len(system.numbers)
     A, B, C, D = system.A, system.B, system.C, system.D
+    if system.left > TOLD:
+        linear = replace(linear, notes=(*linear.notes, CUT.format(system.left)))
     return replace(linear, A=A, B=B, C=C, D=D, eigenvalues=values, leading=names), Sides(*system.beside, of.rate)
 
 

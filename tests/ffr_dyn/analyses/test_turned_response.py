@@ -126,3 +126,33 @@ def test_matrices_of_one_moment_of_a_turn_say_so():
     assert not fd.linearise(scene, outputs=("disc.omega_bar.z",)).notes
     still = fd.linearise(spun(0.0), inputs=(push,), outputs=("disc.c.position.x",))
     assert not any("of this moment" in note for note in still.notes)
+
+
+@pytest.mark.parametrize(("flat", "support", "speed"), [((1.2e4, 0.8e4), (0, 0), 40), ((1.6e4, 0.4e4), (0, 2e4), 60)])
+def test_a_flat_shaft_in_supports_that_are_not_alike_answers_by_all_harmonics(flat, support, speed):
+    """Against the equations in axes at rest, whose stiffness has a second harmonic, with twenty-five of the motion."""
+    damping, f = 8.0, np.linspace(3, 30, 10)
+    disc = fd.rigid_body("disc", mass=1.0, inertia=(1e-3, 1e-3, 2e-3), points={"c": (0, 0, 0)})
+    hub = fd.rigid_body("hub", mass=1.0, inertia=(1, 1, 1), points={"c": (0, 0, 0)})
+    scene = fd.Scene(
+        [fd.Body("hub", hub), fd.Body("disc", disc, omega_bar=(0, 0, speed))],
+        [fd.Joint("axle", "revolute", "ground.O", "hub.c", axis=(0, 0, 1))],
+        [fd.Driver("motor", "axle", fd.polynomial(0.0, speed))],
+        forces=[
+            fd.Bushing("shaft", "hub.c", "disc.c", (*flat, 1e6, 1e3, 1e3, 1e3), (0, 0, 0, 0.1, 0.1, 0.1)),
+            fd.Bushing("support", "ground.O", "disc.c", (*support, 0, 0, 0, 0), (damping, damping, 0, 0, 0, 0)),
+        ],
+        ground={"O": (0, 0, 0)},
+    )  # fmt: skip
+    outputs = ["disc.c.position.x", "disc.c.position.y"]
+    found = fd.response(scene, input="disc.c.force.x", outputs=outputs, frequencies=f, about="steady")
+    mean = np.diag(sum(flat) / 2 + np.array(support))
+    twice = (flat[0] - flat[1]) / 4 * np.array([[1, -1j], [-1j, -1]])  # beside exp(2 i w t)
+    numbers, expected = np.arange(-12, 13), []
+    for s in 2j * np.pi * f:
+        rates = s + 2j * numbers * speed
+        A = np.kron(np.diag(rates**2 + damping * rates), np.eye(2)) + np.kron(np.eye(25), mean)
+        A += np.kron(np.eye(25, k=-1), twice) + np.kron(np.eye(25, k=1), twice.conj())
+        expected.append(np.linalg.solve(A, np.eye(50)[24])[24:26])
+    np.testing.assert_allclose(found["transfer"] @ [1, 1j], expected, atol=1e-9 * np.abs(expected).max())
+    assert not any("harmonics" in note for note in found.attributes["notes"])

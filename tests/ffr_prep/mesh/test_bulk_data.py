@@ -286,6 +286,16 @@ def inp(unit, elastic=None, more=""):
     return "\n".join([*lines, "*SOLID SECTION, ELSET=EALL, MATERIAL=STAHL", ""])
 
 
+def test_parameters_go_on_over_several_lines_and_blanks_within_a_keyword_do_not_matter(tmp_path):
+    text = inp("m").replace(
+        "*SOLID SECTION, ELSET=EALL, MATERIAL=STAHL", "*Solid  Section,\n elset=Eall,\n material=STAHL"
+    )
+    (tmp_path / "a.inp").write_text(text)
+    mesh = fp.read_mesh(tmp_path / "a.inp")
+    (material,) = fp.file_materials(tmp_path / "a.inp", mesh).values()
+    assert material.name == "Stahl"
+
+
 @pytest.mark.parametrize("unit", STEEL)
 def test_the_material_of_the_file_is_used_in_its_units(tmp_path, unit, capsys):
     (tmp_path / "a.inp").write_text(inp(unit))
