@@ -111,7 +111,7 @@ class UserFunctions:
         self.failure: str | None = None
         self.cause: BaseException | None = None
         self._c_function = _SIGNATURE(self._call) if callbacks else None
-        self.address = ctypes.cast(self._c_function, ctypes.c_void_p).value or 0
+        self.address = (ctypes.cast(self._c_function, ctypes.c_void_p).value or 0) if self._c_function else 0
 
     def _call(self, t: float, x_address: int, v_address: int, out_address: int) -> int:
         x = _at(x_address, self.place.x_size)
