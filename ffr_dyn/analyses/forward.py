@@ -22,7 +22,19 @@ from ffr_dyn.analyses.rotating.periodic import periodically
 from ffr_dyn.analyses.settings import Settings
 from ffr_dyn.consistency.assemble import Assembled, assemble
 from ffr_dyn.consistency.quasi_static import quasi_static
-from ffr_dyn.consistency.step_error import Beside, StepError, from_rounding, jumps, step_errors, too_coarse
+from ffr_dyn.consistency.step_error import (
+    PARTLY_STIFF,
+    PLACES,
+    Beside,
+    StepError,
+    from_rounding,
+    jumps,
+    of_the_range,
+    percent,
+    step_errors,
+    too_coarse,
+    worst,
+)
 from ffr_dyn.consistency.unresolved import Vibrations, lasting, leading, vibrations
 from ffr_dyn.functions.stopwatch import Stopwatch
 from ffr_dyn.functions.together import Say, together
@@ -42,7 +54,6 @@ PROJECTED = (
     1e-8  # of the accuracy [m, -], that constraints are closed to: 1e-9 m moved forces by up to 1e-3 of their range
 )
 SURE = 2  # order that linearly implicit methods keep where elastic forces are stiff
-PARTLY_STIFF = 2.15  # order of those of order three, of an output of which that is not known
 SLOW = 0.7  # a ringing output's error falls slower than the step to this power,
 IN_COMPANY = 1.4  # or to this one, if it is of vibration, where others ring
 QUICK = 1e7  # microseconds of the further runs, by `_cost`, up to which they are made unasked
@@ -50,8 +61,6 @@ QUICK = 1e7  # microseconds of the further runs, by `_cost`, up to which they ar
 Beginning = Literal["as-given", "quasi-static", "steady", "periodic"]  # the default and the others
 
 # What a step is to keep within the accuracy always, and what where it does not ring.
-_LOADS = re.compile(r"\.(force|moment|torque|tension|effort)$")
-PLACES = re.compile(r"\.(position|R|p|angle|stroke|orientation)$")
 DRIVING = re.compile(r"\.(displacement|rotation|force|moment|effort|torque|tension)$|^measured\.")
 
 
@@ -365,7 +374,7 @@ def _finished(runs: _Runs, trial: _Trial, path: str | Path | None, ringing: Set[
     told = {name: [e.error, e.of_range] for name, e in trial.errors.items()}
     more: dict[str, Any] = {"notes": notes, "errors": told}
     if trial.errors:
-        more["accuracy"] = _at_least(trial.errors) if unseen else _worst(trial.errors)
+        more["accuracy"] = _at_least(trial.errors) if unseen else worst(trial.errors)
         more["effort"] = sum(runs.work) / max(1, result.attributes["evaluations"])
     attributes = {**result.attributes, **more}
     if path is not None:
@@ -373,28 +382,10 @@ def _finished(runs: _Runs, trial: _Trial, path: str | Path | None, ringing: Set[
     return replace(result, attributes=attributes)
 
 
-def _worst(errors: Mapping[str, StepError]) -> str:
-    name = max(errors, key=lambda one: errors[one].of_range)
-    said = [f"step: within {_of_the_range(errors[name].of_range)} of {name}"]
-    for words, kind in (("positions and angles", PLACES), ("forces and moments", _LOADS)):
-        of_kind = [error.of_range for one, error in errors.items() if kind.search(one)]
-        if of_kind and not kind.search(name):
-            said.append(f"{words} within {_percent(max(of_kind))}")
-    return "; ".join(said)
-
-
 def _at_least(errors: Mapping[str, StepError]) -> str:
     """Of errors that leave out what the steps damp."""
     name = max(errors, key=lambda one: errors[one].of_range)
-    return f"step: not known; {name} is off by {_of_the_range(errors[name].of_range)} or more"
-
-
-def _of_the_range(share: float) -> str:
-    return f"{_percent(share)} of the range" if share < 1 else f"{float(f'{share:.2g}'):g} times the range"
-
-
-def _percent(share: float) -> str:
-    return f"{float(f'{100 * share:.2g}'):g} %"
+    return f"step: not known; {name} is off by {of_the_range(errors[name].of_range)} or more"
 
 
 def _unseen(trial: _Trial) -> list[str]:
@@ -420,7 +411,7 @@ def _unresolved(runs: _Runs, trial: _Trial, ringing: Set[str]) -> list[str]:
     times = (4 / step) / ((4 if method.order > 2 else 2) / method.step)
     return [
         f"vibration{words} that a step of {method.step:.3g} s does not resolve carries "
-        f"{_of_the_range(told[name].of_range)} of {name}{_others(len(told) - 1)}; rk4 with a step of {step:.2g} s resolves "
+        f"{of_the_range(told[name].of_range)} of {name}{_others(len(told) - 1)}; rk4 with a step of {step:.2g} s resolves "
         f"it, for about {max(times, 1):.2g} times the time of this run{_without_shock(runs.begin)}"
     ]
 
@@ -436,7 +427,7 @@ def _coarse(result: Result) -> list[str]:
     name = max(found, key=lambda one: found[one])
     return [
         f"rows every {float(result.attributes['output_step']):g} s are too coarse for what {name} does"
-        f"{_others(len(found) - 1)}: between them it is up to {_percent(found[name])} of its range off the curve through "
+        f"{_others(len(found) - 1)}: between them it is up to {percent(found[name])} of its range off the curve through "
         "them, or more; take a smaller output_step to see it"
     ]
 

@@ -26,7 +26,8 @@ they do; if they do not it is 3.4 times too large at steps four times as long. T
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 
@@ -47,6 +48,9 @@ ARM = 1e-6  # of the largest range of forces times that of positions, the same f
 IN_PART = 1.5  # of what a twin with the same step is off
 MIDDLE, FLOOR, WINDOW = 3.0, 2.5, 16  # of amplitudes beside a twin with half the step
 TWIN = 2  # order of twins
+PLACES = re.compile(r"\.(position|R|p|angle|stroke|orientation)$")
+LOADS = re.compile(r"\.(force|moment|torque|tension|effort)$")
+PARTLY_STIFF = 2.15  # order of ROS3, of an output of which it is not known whether elastic forces are stiff
 FAR, NEXT = 0.1, 2.0  # of the range, by which a step up to so many times as long makes a difference of order one
 NOISE = (70 / 36) ** 0.5  # by which rows without relation are farther off the curve than they are large
 RATES = {"position": "velocity", "R": "v", "q": "q_dot"}
@@ -355,3 +359,22 @@ def _grows_evenly(size: Array, seed: float, motion: float) -> bool:
 def _rate_of(name: str) -> str:
     of, _, last = name.rpartition(".")
     return f"{of}.{RATES.get(last, '')}"
+
+
+def worst(errors: Mapping[str, StepError]) -> str:
+    """Of all outputs, of positions and angles, of forces and moments."""
+    name = max(errors, key=lambda one: errors[one].of_range)
+    said = [f"step: within {of_the_range(errors[name].of_range)} of {name}"]
+    for words, kind in (("positions and angles", PLACES), ("forces and moments", LOADS)):
+        of_kind = [error.of_range for one, error in errors.items() if kind.search(one)]
+        if of_kind and not kind.search(name):
+            said.append(f"{words} within {percent(max(of_kind))}")
+    return "; ".join(said)
+
+
+def of_the_range(share: float) -> str:
+    return f"{percent(share)} of the range" if share < 1 else f"{float(f'{share:.2g}'):g} times the range"
+
+
+def percent(share: float) -> str:
+    return f"{float(f'{100 * share:.2g}'):g} %"
