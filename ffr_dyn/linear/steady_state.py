@@ -301,9 +301,14 @@ def steady_state(assembled: Assembled, time: float, start: Array | None = None) 
 
 
 def _together(found: Steady) -> Machine | None:
-    """The machine with all bodies in the screw of one of the fastest, where the joints allow it; None where they do not."""
-    speeds = np.linalg.norm(found.machine.screws.w, axis=1)
+    """The machine with all bodies in the screw of one of the fastest, where the joints allow it; None where they do not, and
+    where others turn in another way."""
+    w = found.machine.screws.w
+    speeds = np.linalg.norm(w, axis=1)
     fastest = np.flatnonzero(speeds >= (1 - SAME) * speeds.max())
+    turning = w[speeds > SAME * speeds.max()]
+    if len(turning) and not (np.abs(turning - w[fastest[0]]) <= SAME * speeds.max()).all():
+        return None
     return next((one for b in fastest if (one := _in_screw(found, int(b)))), None)
 
 

@@ -36,6 +36,10 @@ from ffr_prep.common.progress import no_count
 MODES = 10
 MET = 1e-8  # of the speed of a crossing, relative to the range
 
+AtSpeed = Callable[[float, Spectrum | None], Spectrum]
+Row = tuple[float, Spectrum]
+Measure = Callable[[float, Spectrum, int], float]
+
 
 @dataclass(frozen=True)
 class Campbell(OfMoment):
@@ -119,13 +123,7 @@ def campbell(
     if len(values) < 2 or not (np.diff(values) > 0).all():
         raise InputError(f"the speeds are {values}; give two or more that rise, such as 0..500")
     at = _at_speeds(scene, turn, time)
-    spectra = list[Spectrum]()
-    for speed in values:
-        one = at(speed, spectra[-1] if spectra else None)
-        spectra.append(followed(spectra[-1], one) if spectra else one)
-        progress(len(spectra), len(values) + min(modes, spectra[0].values.size))
-    if not spectra[0].values.size:
-        raise InputError("nothing vibrates: joints and the driver fix every motion, or what they leave is free")
+    spectra = _spectra(at, values, modes, progress)
     middle = _told_by(spectra)
     whirling = np.nan_to_num(middle.whirl) > ONE_WAY
     everything, called = _slowest(spectra, whirling), middle.names
@@ -145,6 +143,18 @@ def campbell(
     if path is not None:
         save_result(result, path)
     return result
+
+
+def _spectra(at: AtSpeed, values: Sequence[float], modes: int, progress: Callable[[int, int], None]) -> list[Spectrum]:
+    """The vibrations at every speed, each in its place. InputError where there are none."""
+    spectra = list[Spectrum]()
+    for speed in values:
+        one = at(speed, spectra[-1] if spectra else None)
+        spectra.append(followed(spectra[-1], one) if spectra else one)
+        progress(len(spectra), len(values) + min(modes, spectra[0].values.size))
+    if not spectra[0].values.size:
+        raise InputError("nothing vibrates: joints and the driver fix every motion, or what they leave is free")
+    return spectra
 
 
 def _told_by(spectra: Sequence[Spectrum]) -> Spectrum:
@@ -170,10 +180,6 @@ def _at_speeds(scene: Scene, turn: str, time: float) -> Callable[[float, Spectru
 
 
 # ---- crossings ------------------------------------------------------------------------------------------------------
-
-AtSpeed = Callable[[float, Spectrum | None], Spectrum]
-Row = tuple[float, Spectrum]
-Measure = Callable[[float, Spectrum, int], float]
 
 
 def _off_order(ground: bool, order: float) -> Measure:

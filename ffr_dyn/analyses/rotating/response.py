@@ -151,10 +151,7 @@ def response(
     at = about_state(scene, about, time)
     acts = acting(at, input, time)
     names = (*components(acts.scene, outputs, time, "response"), *acts.moved)
-    linear = linearised(acts.scene, time, (acts.effort,), names)
-    over_turn = outputs_over_turn if acts.driver else seen_from_ground
-    linear, sides = over_turn(linear, acts.scene, (acts.effort,), names)
-    linear, sides = _by_motion(linear, sides, at, time) if acts.driver else _by_base(linear, sides, acts)
+    linear, sides = _linear(acts, at, names, time)
     low, high = band_of if band_of else (None, None)
     if noise.size and not band_of:
         low, high = noise[0, 0] or None, noise[-1, 0]
@@ -202,6 +199,14 @@ def _mean_square(linear: Linearisation, sides: Sides | None, noise: Array, order
     more = mean_square(linear.A, linear.B, sides.C, sides.D, noise, order)
     found: Array = own + 2 * more.reshape(-1, own.size).sum(axis=0)
     return found
+
+
+def _linear(acts: Acting, at: Scene, names: tuple[str, ...], time: float) -> tuple[Linearisation, Sides | None]:
+    """From the input to the outputs, over the turn of what turns; and what they answer beside."""
+    found = linearised(acts.scene, time, (acts.effort,), names)
+    over_turn = outputs_over_turn if acts.driver else seen_from_ground
+    linear, sides = over_turn(found, acts.scene, (acts.effort,), names)
+    return _by_motion(linear, sides, at, time) if acts.driver else _by_base(linear, sides, acts)
 
 
 def about_state(scene: Scene, about: About, time: float) -> Scene:

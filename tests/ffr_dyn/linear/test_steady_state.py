@@ -215,3 +215,24 @@ def test_a_torque_that_follows_another_body_holds_what_it_turns():
     )  # fmt: skip
     found = fd.steady(scene)
     assert found["axis_a.angle"][0] - found["axis_b.angle"][0] == pytest.approx(0.02, rel=1e-8)
+
+
+@pytest.mark.parametrize("speeds", [(1.0, -1.5), (1.0, -1.0), (1.0, 0.4)])
+def test_rotors_that_turn_against_each_other_go_on_doing_so(speeds):
+    """Bodies that have velocities of their own are not turned with others, however much forces between them vary."""
+    bodies = [
+        fd.Body(
+            name,
+            fd.rigid_body(name, mass=2.0, inertia=(0.01, 0.01, 0.02), points={"c": (0, 0, 0)}),
+            omega_bar=(0, 0, w),
+        )
+        for name, w in zip("ab", speeds, strict=True)
+    ]
+    k = (2e4, 2e4, 1e6, 1e4, 1e4, 0)
+    ends = (("ground.O", "a.c"), ("ground.O", "b.c"), ("a.c", "b.c"))
+    bearings = [fd.Bushing(f"bearing_{n}", *pair, k) for n, pair in enumerate(ends)]
+    found = fd.steady(fd.Scene(bodies, forces=bearings, ground={"O": (0, 0, 0)}), speeds=(30.0,))
+    share = 30 / max(map(abs, speeds))
+    assert found["a.omega_bar"][0, 2] == pytest.approx(share * speeds[0])
+    assert found["b.omega_bar"][0, 2] == pytest.approx(share * speeds[1])
+    assert not any("turn with it" in note for note in found.attributes["notes"])
