@@ -364,10 +364,11 @@ def _start(runs: _Runs, method: Integrator, result: Result, twin: Beside) -> tup
     steps = min(count + math.ceil(BEYOND * count), round((runs.how["end"] - runs.start) / method.step))
     share = 0.5 * twin.ratio * method.step
     fine = Twin(share, lasting(runs.vibrations, share))
-    span = {"output_step": method.step, "end": runs.start + steps * method.step}
-    calls = [lambda say, one=one: runs.run(one, **span, progress=say) for one in (method, fine)]  # type: ignore[misc]
-    found = runs.together(calls, leader=False)
-    return () if any(_failed(one) for one in found) else tuple(found)
+    span = {"output_step": method.step, "end": runs.start + steps * method.step, "progress": None}
+    try:
+        return runs.run(method, **span), runs.run(fine, **span)
+    except (ComputationError, InputError):  # the latter where steps are rounding beside the time of the start
+        return ()
 
 
 def _longer_twin(runs: _Runs, method: Integrator, count: int, say: Say) -> Beside | None:
