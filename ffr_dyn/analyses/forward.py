@@ -6,6 +6,7 @@ looked for that is short enough.
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable, Mapping, Sequence, Set
 from dataclasses import dataclass, field, replace
@@ -23,16 +24,19 @@ from ffr_dyn.analyses.settings import Settings
 from ffr_dyn.consistency.assemble import Assembled, assemble
 from ffr_dyn.consistency.quasi_static import quasi_static
 from ffr_dyn.consistency.step_error import (
+    BEYOND,
     PARTLY_STIFF,
     PLACES,
     Beside,
     StepError,
+    begins_alone,
     from_rounding,
     jumps,
     of_the_range,
     percent,
     step_errors,
     too_coarse,
+    with_start,
     worst,
 )
 from ffr_dyn.consistency.unresolved import Vibrations, lasting, leading, vibrations
@@ -302,9 +306,13 @@ def _told(runs: _Runs, trial: _Trial, other: Any, *longer: Any) -> _Trial:
     """The run with its errors, also by what `_further` returned."""
     if _failed(other):
         return replace(trial, errors={})
-    order = 1 if runs.jumps else PARTLY_STIFF if _share(trial.method) == 0.5 else trial.method.order
+    share, failed = _share(trial.method), any(isinstance(twin, ComputationError) for twin in longer)
+    too_long = failed or (share is not None and not trial.twins)  # steps for an order, where twins fail
+    order = 1 if runs.jumps or too_long else PARTLY_STIFF if share == 0.5 else trial.method.order
     twins = (*trial.twins, *(twin for twin in longer if not _failed(twin)))
-    return replace(trial, twins=twins, errors=step_errors(trial.result, other, order, twins))
+    errors = step_errors(trial.result, other, order, twins)
+    start = _start(runs, trial.method, trial.result, trial.twins[0]) if trial.twins else ()
+    return replace(trial, twins=twins, errors=with_start(errors, trial.result, *start) if start else errors)
 
 
 def _further(
@@ -347,6 +355,22 @@ def _twin(runs: _Runs, method: Integrator, share: float, say: Say) -> Beside:
     """With a share of the step, and the damping of the scene over that."""
     step = share * method.step
     return Beside(runs.run(Twin(step, lasting(runs.vibrations, step)), progress=say), share)
+
+
+def _start(runs: _Runs, method: Integrator, result: Result, twin: Beside) -> tuple[Result, ...]:
+    """The steps to the first row and a little beyond as rows, and those of a twin with half the twin's step, where what
+    vibrates then is gone soon; () elsewhere, and where they fail."""
+    if not begins_alone(result, twin.result):
+        return ()
+    count = round(runs.output_step / method.step)
+    steps = min(count + math.ceil(BEYOND * count), round((runs.how["end"] - runs.start) / method.step))
+    share = 0.5 * twin.ratio * method.step
+    fine = Twin(share, lasting(runs.vibrations, share))
+    span = {"output_step": method.step, "end": runs.start + steps * method.step, "progress": None}
+    try:
+        return runs.run(method, **span), runs.run(fine, **span)
+    except (ComputationError, InputError):  # the latter where steps are rounding beside the time of the start
+        return ()
 
 
 def _longer_twin(runs: _Runs, method: Integrator, count: int, say: Say) -> Beside | None:
@@ -469,7 +493,7 @@ def _searched(runs: _Runs, within: Within, kept: dict[str, Any], count: int) -> 
                 raise
             count *= FIRST
             continue
-        if not trial.errors or _excess(trial, ringing, trials) <= within.accuracy:
+        if not trial.errors or count >= FINEST or _excess(trial, ringing, trials) <= within.accuracy:
             trial = _told(runs, trial, *runs.together(_further(runs, method, count, trials), leader=False))
         excess = _excess(trial, ringing, trials) / within.accuracy
         trials.append(trial)
