@@ -314,7 +314,8 @@ def _further(
 
 def _other(runs: _Runs, method: Any, count: int, say: Say) -> Beside:
     """The run with another step: about twice the step, or four times of a method of higher order, where elastic forces are
-    implicit and that is part of a row, else half of it; with a tenth of the tolerance of a method that chooses its steps, and work added up twice as often."""
+    implicit and that is part of a row, else half of it; with a tenth of the tolerance of a method that chooses its steps, and
+    work added up twice as often."""
     if method.controlled:
         closer = replace(method, tolerances=replace(method.tolerances, relative=method.tolerances.relative / 10))
         return Beside(runs.run(closer, progress=say, looks=2 * LOOKS), 10.0 ** (-1.0 / method.order))

@@ -1,7 +1,8 @@
 """Couplings in the turns that drivers tell.
 
-An angle is known up to whole turns, so the row of a coupling holds up to what they make of it: a rack may stand a turn of its
-pinion off, a wheel a tooth. Where drivers prescribe a coordinate, couplings and screws carry its value on from joint to joint.
+An angle is known up to whole turns, so the row of a coupling holds up to what they make of it: a rack may stand a turn of
+its pinion off, a wheel a tooth. Where drivers prescribe a coordinate, couplings and screws carry its value on from joint to
+joint.
 """
 
 from __future__ import annotations

@@ -33,8 +33,8 @@ Close = Callable[[Constraints, Array], Array]
 
 @dataclass(frozen=True)
 class DrivenAngle:
-    """Of a driver's word: its function among the drives of the rows, its value and how far on the joint has to turn [rad]; the
-    same of a coupling, and the steps in which it is led there."""
+    """Of a driver's word: its function among the drives of the rows, its value and how far on the joint has to turn [rad];
+    the same of a coupling, and the steps in which it is led there."""
 
     function: int
     value: float

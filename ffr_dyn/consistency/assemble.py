@@ -145,8 +145,8 @@ def _uncounted(rows: Constraints, x: Array) -> list[str]:
         force.name for force in rows.scene.forces if (force.place.way, getattr(force, "turns", None)) == ("angle", 0)
     ]
     return [
-        f"a driver begins {turns} whole turns on, and {', '.join(map(repr, begun))} within half a turn, as `turns` says: where "
-        "it has turned along, give it the whole turns of its joint"
+        f"a driver begins {turns} whole turns on, and {', '.join(map(repr, begun))} within half a turn, as `turns` says: "
+        "where it has turned along, give it the whole turns of its joint"
     ] * (turns != 0 and bool(begun))
 
 

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 import ffr_dyn as fd
-
 from ffr_dyn.analyses.forward import forward
 from ffr_dyn.compile.scene_tables import compile_scene
 from ffr_dyn.consistency.step_error import (
@@ -237,8 +236,8 @@ def test_a_pendulum_that_stands_on_its_head_falls_by_chance(plane):
 
 
 def test_work_that_is_added_up_too_seldom_is_told():
-    """Of a stop that is struck between the states that work is added up from, whatever the tolerance: the change of the energy
-    is the work."""
+    """Of a stop that is struck between the states that work is added up from, whatever the tolerance: the work is the change
+    of the energy."""
     ball = rigid_body("ball", mass=1.0, inertia=(1, 1, 1), points={"o": np.zeros(3)})
     dropped = Scene(
         (Body("ball", ball, position=(0, 0, 0.5)),),

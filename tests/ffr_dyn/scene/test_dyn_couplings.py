@@ -6,10 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-
-import ffr_dyn as fd
 from synthetic import cloud
 
+import ffr_dyn as fd
 from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.compile.engine import evaluate_at, new_engine
 from ffr_dyn.compile.scene_tables import compile_scene
