@@ -11,7 +11,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ffr_dyn.closing.constraints import Constraints, constraints_of, without
-from ffr_dyn.closing.driven_angles import TURN, driven_angles, led_to_drivers
+from ffr_dyn.closing.coupled_turns import TURN
+from ffr_dyn.closing.driven_angles import driven_angles, led_to_drivers
 from ffr_dyn.closing.going_on import going_on
 from ffr_dyn.closing.independence import independent_blocks
 from ffr_dyn.closing.inertia_left import require_inertia
