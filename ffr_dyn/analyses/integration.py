@@ -121,10 +121,9 @@ def integrate(
     events = several("events", events, (Event,))
     assembled = assemble(scene, time=start) if assembled is None else assembled
     wanted = selected(assembled.system, outputs)
-    span = (start, end, output_step)
     path = resume if path is None else path
     mark = "" if path is None else _fingerprint(assembled, method, stabilisation, start, output_step, wanted)
-    header = _header(scene, assembled, method, stabilisation, span)
+    header = _header(scene, assembled, method, stabilisation, (start, end, output_step))
     shown_alone = path is None and not events
     kept = _kept(assembled.system, wanted, rows) if shown_alone else Measured(assembled.system, wanted)
     run = _begun(assembled, method, stabilisation, start, spacing, kept, resume, mark)
