@@ -17,7 +17,7 @@ from typing import Any, ClassVar, Literal, get_args
 import numpy as np
 
 from ffr_dyn.analyses.events import Event
-from ffr_dyn.analyses.integration import check_method, check_output_step, evaluation_cost, integrate
+from ffr_dyn.analyses.integration import LOOKS, check_method, check_output_step, evaluation_cost, integrate
 from ffr_dyn.analyses.registry import OverTime, option
 from ffr_dyn.analyses.rotating.periodic import periodically
 from ffr_dyn.analyses.settings import Settings
@@ -331,10 +331,11 @@ def _further(
 
 def _other(runs: _Runs, method: Any, count: int, say: Say) -> Beside:
     """The run with another step: about twice the step, or four times of a method of higher order, where elastic forces are
-    implicit and that is part of a row, else half of it; with a tenth of the tolerance of a method that chooses its steps."""
+    implicit and that is part of a row, else half of it; with a tenth of the tolerance of a method that chooses its steps, and
+    work added up twice as often."""
     if method.controlled:
-        tolerances = replace(method.tolerances, relative=method.tolerances.relative / 10)
-        return Beside(runs.run(replace(method, tolerances=tolerances), progress=say), 10.0 ** (-1.0 / method.order))
+        closer = replace(method, tolerances=replace(method.tolerances, relative=method.tolerances.relative / 10))
+        return Beside(runs.run(closer, progress=say, looks=2 * LOOKS), 10.0 ** (-1.0 / method.order))
     if method.implicit and count > 1:
         fewer = -(-count // (4 if method.order > SURE else 2))
         try:

@@ -95,6 +95,7 @@ def integrate(
     progress: Callable[[float], None] | None = None,
     stopwatch: Stopwatch | None = None,
     assembled: Assembled | None = None,
+    looks: int = LOOKS,
 ) -> Result:
     """Integrate the equations of motion of a scene from `start` to `end` [s], keeping a row every `output_step` [s].
 
@@ -106,23 +107,23 @@ def integrate(
     progress    : called with the time reached, a few times a second
     stopwatch   : takes the time of the integrator's compiled loop
     assembled   : what `assemble` made of the scene at `start`, for programs that run it more than once
+    looks       : states from row to row of which work is added up, where the method chooses its steps
 
     Raises InputError for a scene or settings that cannot be used, ComputationError when the run fails: with the time,
     the body or joint, the likely cause and what to change. Energy that no force or driver has put in is a failure.
     """
     check_output_step(output_step)
     check_method(method)
-    spacing = output_step / LOOKS if method.controlled else method.step
+    spacing = output_step / looks if method.controlled else method.step
     substeps, rows = _counts(end - start, output_step, spacing)
     _check_step(scene, method)
     _check_stabilisation(method, stabilisation)
     events = several("events", events, (Event,))
     assembled = assemble(scene, time=start) if assembled is None else assembled
     wanted = selected(assembled.system, outputs)
-    span = (start, end, output_step)
     path = resume if path is None else path
     mark = "" if path is None else _fingerprint(assembled, method, stabilisation, start, output_step, wanted)
-    header = _header(scene, assembled, method, stabilisation, span)
+    header = _header(scene, assembled, method, stabilisation, (start, end, output_step))
     shown_alone = path is None and not events
     kept = _kept(assembled.system, wanted, rows) if shown_alone else Measured(assembled.system, wanted)
     run = _begun(assembled, method, stabilisation, start, spacing, kept, resume, mark)

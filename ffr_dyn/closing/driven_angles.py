@@ -2,7 +2,8 @@
 
 Newton's method from far away may end anywhere, or nowhere. So where an angle is drawn far from its driver's value it is led
 there step by step, as a continuation in that value, with all joints closed (Allgower & Georg, Numerical Continuation Methods,
-1990, ch. 2): the shorter way round, and where that is blocked the other.
+1990, ch. 2): the shorter way round, and where that is blocked the other. Couplings that stand whole turns off then
+(`ffr_dyn.closing.coupled_turns`) are led on in the same way.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from functools import partial
 import numpy as np
 
 from ffr_dyn.closing.constraints import Constraints
+from ffr_dyn.closing.coupled_turns import TURN, relations_off
 from ffr_dyn.closing.going_on import going_on
 from ffr_dyn.closing.positions import LARGEST_TURN, close_velocities, largest_turn
 from ffr_dyn.equations.kinematics import marker_directions
@@ -24,16 +26,20 @@ from ffr_prep.common.errors import InputError
 
 FAR = 1.0  # rad, beyond which an angle is led to its driver's value
 STEP = 0.3  # rad
-TURN = 2 * np.pi
+NEAR = 0.2  # of what whole turns make of a coupling: steps in which its row stays with one of its values
+
+Close = Callable[[Constraints, Array], Array]
 
 
 @dataclass(frozen=True)
 class DrivenAngle:
-    """Of a driver's word: its function among the drives of the rows, its value and how far on the joint has to turn [rad]."""
+    """Of a driver's word: its function among the drives of the rows, its value and how far on the joint has to turn [rad];
+    the same of a coupling, and the steps in which it is led there."""
 
     function: int
     value: float
     left: float
+    step: float = STEP
 
 
 def driven_angles(constraints: Constraints, x: Array) -> list[DrivenAngle]:
@@ -51,12 +57,24 @@ def driven_angles(constraints: Constraints, x: Array) -> list[DrivenAngle]:
     return found
 
 
-def led_to_drivers(constraints: Constraints, x: Array, close: Callable[[Constraints, Array], Array]) -> Array:
+def led_to_drivers(constraints: Constraints, x: Array, close: Close) -> Array:
     """`close(constraints, x)`, positions that meet all rows, in steps where driven angles at x are far from their drivers'
-    values, or no other way leads there.
+    values, or no other way leads there; with couplings in the turns that drivers tell, where they can be.
 
     Raises what `close` does.
     """
+    found = _led_there(constraints, x, close)
+    off = [
+        DrivenAngle(function, float(constraints.drives[function, 0]), by, NEAR * spacing)
+        for function, by, spacing in relations_off(constraints, found)
+    ]
+    try:
+        return _led(constraints, off, [one.left for one in off], found, close) if off else found
+    except InputError:
+        return found
+
+
+def _led_there(constraints: Constraints, x: Array, close: Close) -> Array:
     angles, errors = driven_angles(constraints, x), list[InputError]()
     if all(abs(angle.left) <= FAR for angle in angles):
         try:
@@ -76,10 +94,10 @@ def _led(
     angles: list[DrivenAngle],
     way: list[float],
     x: Array,
-    close: Callable[[Constraints, Array], Array],
+    close: Close,
 ) -> Array:
     """Positions that meet all rows, from x along the ways [rad] of the driven angles."""
-    count = int(np.ceil(max(abs(left) for left in way) / STEP))
+    count = int(np.ceil(max(abs(left) / angle.step for angle, left in zip(angles, way, strict=True))))
     found = close(_driven_to(constraints, angles, way, -1.0, 1.0 / max(count, 1)), x)
     for k in range(1, count + 1):
         begun = _driven_to(constraints, angles, way, (k - 1) / count - 1.0, 1.0 / count)

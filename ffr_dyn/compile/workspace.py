@@ -199,7 +199,7 @@ def _row_work(m: Model) -> RowWork:
         **_zeros(jac=(K * D, 9, LANES), kept=(K * D, 9, LANES), X=K * D * 12 * LANES, Y=12 * LANES),
         **_zeros(scale=K * LANES, least=K * LANES, pivots=K * LANES, step=K * LANES),
         **_zeros(compliance=K * LANES, pull=K * LANES, relief=K * LANES),
-        **_zeros(along=(3, C), begun=(2, C), grown=(3, 2, C), held=(2, C)),
+        **_zeros(along=(4, C), begun=(2, C), grown=(3, 2, C), held=(3, C)),
         **_zeros(wrench=6, P=(M, 36), phiphi=(pairs, 36), S=stored),
     )
 

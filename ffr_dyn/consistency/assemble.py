@@ -11,7 +11,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ffr_dyn.closing.constraints import Constraints, constraints_of, without
-from ffr_dyn.closing.driven_angles import led_to_drivers
+from ffr_dyn.closing.coupled_turns import TURN
+from ffr_dyn.closing.driven_angles import driven_angles, led_to_drivers
 from ffr_dyn.closing.going_on import going_on
 from ffr_dyn.closing.independence import independent_blocks
 from ffr_dyn.closing.inertia_left import require_inertia
@@ -26,7 +27,7 @@ from ffr_dyn.equations.constraint_rows import Block, blocks_of
 from ffr_dyn.equations.layout import Layout, initial_state
 from ffr_dyn.scene.force_kinds import forces_of
 from ffr_dyn.scene.scene import Scene, altered, require_scene
-from ffr_dyn.scene.sensors import StressMeasurement
+from ffr_dyn.scene.sensors import Measurement
 from ffr_dyn.variants.mean_axis import in_mean_axis_frames
 from ffr_dyn.variants.plane import obstacles, planar_forms
 from ffr_prep.body import mesh_doubt, steady_stress_doubt, units_doubts
@@ -102,7 +103,7 @@ def assemble(scene: Scene, *, time: float = 0.0) -> Assembled:
             f"the scene is planar (normal {scene.plane}): computed in the plane, with in-plane modes without their rounding "
             "across it"
         )
-    notes += [*sliding_notes(scene), *_idle(scene), *body_doubts(scene)]
+    notes += [*sliding_notes(scene), *_idle(scene), *_uncounted(rows, x), *body_doubts(scene)]
     notes += held_frequencies(
         declared, [(x[place.R(b)], x[place.p(b)]) for b in range(len(place.n))], scene.plane, time
     )
@@ -113,8 +114,9 @@ def assemble(scene: Scene, *, time: float = 0.0) -> Assembled:
 
 
 def body_doubts(scene: Scene) -> list[str]:
-    """Notes on bodies: a mesh too coarse, a measured stress that lacks that of inertia, numbers that cannot be meant."""
-    measured = {of.body for of in scene.measurements if isinstance(of, StressMeasurement)}
+    """Notes on bodies: a mesh too coarse, a measured stress or section force that lacks that of inertia, numbers that cannot
+    be meant."""
+    measured = {of.body for of in scene.measurements if not isinstance(of, Measurement)}
     doubts = [(body.name, mesh_doubt(body.model.provenance)) for body in scene.bodies]
     doubts += [(b.name, steady_stress_doubt(b.model.provenance)) for b in scene.bodies if b.name in measured]
     doubts += [(body.name, doubt) for body in scene.bodies for doubt in units_doubts(body.model)]
@@ -135,6 +137,18 @@ def _idle(scene: Scene) -> list[str]:
         for name, places in acts
         if places and all(place.startswith("ground.") for place in places)
     ]
+
+
+def _uncounted(rows: Constraints, x: Array) -> list[str]:
+    """A note where drivers tell whole turns, and forces on angles are to begin within half a turn."""
+    turns = max((round(angle.value / TURN) for angle in driven_angles(rows, x)), key=abs, default=0)
+    begun = [
+        force.name for force in rows.scene.forces if (force.place.way, getattr(force, "turns", None)) == ("angle", 0)
+    ]
+    return [
+        f"a driver begins {turns} whole turns on, and {', '.join(map(repr, begun))} within half a turn, as `turns` says: "
+        "where it has turned along, give it the whole turns of its joint"
+    ] * (turns != 0 and bool(begun))
 
 
 def shifted(scene: Scene, place: Layout, guess: Array, x: Array) -> list[str]:

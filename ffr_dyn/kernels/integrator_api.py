@@ -122,6 +122,7 @@ __all__ = [
     "HERE",
     "IN_SHARED",
     "IN_V",
+    "IN_X",
     "NEAR",
     "NORMAL",
     "NOT_CONVERGED",

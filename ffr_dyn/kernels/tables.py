@@ -261,11 +261,11 @@ class RowWork(NamedTuple):
     pull: F1  # (8 K,) likewise gamma h k / (gamma h d + (gamma h)^2 k)
     relief: F1  # (8 K,) what rows of stiff forces before have taken from the diagonal of S
     along: (
-        F2  # (3, C) of stiff forces: coordinate, rate and quadratic velocity part of its second derivative at the state
+        F2  # (4, C) of stiff forces: coordinate, rate, quadratic velocity part of its second derivative, 1 of a length
     )
     begun: F2  # (2, C) coordinate and rate at the start of the step
     grown: F3  # (3, 2, C) rates of both by the stages before
-    held: F2  # (2, C) scratch
+    held: F2  # (3, C) scratch
     # (K D, 9, 8) per side of a block: coefficients of point velocity, omega_bar, elastic rotation rate, its rows in lanes
     jac: F3
     kept: F3  # those of another moment, for methods that need both

@@ -17,7 +17,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from ffr_dyn.functions.rotation import triad
-from ffr_dyn.functions.time_functions import TimeFunction, as_time_function
+from ffr_dyn.functions.time_functions import TimeFunction, as_time_function, constant
 from ffr_dyn.scene.checks import check_markers, check_own_name
 from ffr_dyn.scene.fields import Direction, In, OfTime
 from ffr_prep.common.arrays import Array
@@ -179,7 +179,8 @@ def distance(i: Array, j: Array, joint: Joint) -> list[Word]:
 
 def screw(i: Array, j: Array, joint: Joint) -> list[Word]:
     """A cylindrical joint whose stroke grows by `pitch` with every turn; zero where both frames coincide."""
-    turn = relation((-joint.pitch / (2 * np.pi), "angle", i, j), (1.0, "stroke", i, j), "stroke follows angle")
+    one, other = (-joint.pitch / (2 * np.pi), "angle", i, j), (1.0, "stroke", i, j)
+    turn = relation(one, other, "stroke follows angle", constant(0.0))
     return [*cylindrical(i, j, joint), turn]
 
 

@@ -14,8 +14,9 @@ So s is one more multiplier, of a row with compliance, w = gh d + gh^2 k:
 It is eliminated as that of a joint, with 1/w on its diagonal of S. Without coordinates of their own stiff forces would turn
 with the bodies from stage to stage, and an unresolved spring would cost the method its order. The slopes k and d come from
 the kernel of the force and need only dominate those of the law, since a W-method keeps its order whatever they are:
-negative ones count as zero, and where both are zero the row does nothing. Newton's methods have the same rows with targets
-of zero: their w is of their own numbers.
+negative ones count as zero, and where both are zero the row does nothing. A length that has passed zero since the step
+began turns back there: the coordinate that goes on is its negative, whose row is the same with the other sign. Newton's
+methods have the same rows with targets of zero: their w is of their own numbers.
 
 Twin: `ffr_dyn.scene.forces.force.Force.slopes`.
 """
@@ -24,11 +25,11 @@ import math
 
 from ffr_dyn.kernels.options import inlined, kernel
 from ffr_dyn.kernels.rows import fill_side
-from ffr_dyn.kernels.tables import BLOCK, BY_PLACE, BY_RATE, LANE, LANES
+from ffr_dyn.kernels.tables import BLOCK, BY_PLACE, BY_RATE, LANE, LANES, LENGTH, WAY
 
 HELD = -math.inf  # in place of a stiffness: the slopes stay what they were
 LEAST = 1e-30  # of w, which binds nothing
-CORRECTED, CURVED = range(2)  # what is kept between the target of a row and its solution
+CORRECTED, CURVED, TURNED = range(3)  # what is kept between the target of a row and its solution
 
 
 @kernel
@@ -48,6 +49,7 @@ def keep_row(r, k, number, value, rate, motion, stiffness, damping):
         rows.compliance[at] = 1.0 / max(by_rate * max(damping, 0.0) + by_place * stiffness, LEAST)
         rows.pull[at] = by_rate * stiffness * rows.compliance[at]
     rows.along[0, row], rows.along[1, row], rows.along[2, row] = value, rate, motion[0]
+    rows.along[3, row] = 1.0 if r.model.loads.row[k, WAY] == LENGTH else 0.0
     fill_side(rows.jac[side], lane, 1.0, motion[1])
     fill_side(rows.jac[side + 1], lane, 1.0, motion[2])
 
@@ -95,11 +97,12 @@ def set_targets(rows, rw, stage, shares, factors, gh, target):
             for j in range(stage):
                 c, u = c + shares[j] * grown[j, 0, row], u + shares[j] * grown[j, 1, row]
                 r_c, r_u = r_c + factors[j] * grown[j, 0, row], r_u + factors[j] * grown[j, 1, row]
-            curved = along[2, row] - (rw.left[row] if stage > 0 else 0.0)
+            way = -1.0 if c < 0.0 and along[3, row] > 0.0 else 1.0
+            curved = way * (along[2, row] - (rw.left[row] if stage > 0 else 0.0))
             pull = rw.pull[LANES * k + row - rows.start[k]]
-            off = pull * (c - along[0, row]) + (1.0 - gh * pull) * (u - along[1, row])
-            target[row] = -curved - r_u - pull * (u + r_c) - off / gh
-            rw.held[CORRECTED, row], rw.held[CURVED, row] = u + gh * r_u, curved
+            off = pull * (c - way * along[0, row]) + (1.0 - gh * pull) * (u - way * along[1, row])
+            target[row] = way * (-curved - r_u - pull * (u + r_c) - off / gh)
+            rw.held[CORRECTED, row], rw.held[CURVED, row], rw.held[TURNED, row] = u + gh * r_u, curved, way
 
 
 @inlined
@@ -108,5 +111,5 @@ def keep_growth(rows, rw, stage, gh, target):
     for k in range(rows.forced.size):
         for row in range(rows.forced[k], rows.start[k + 1]):
             yielded = rw.compliance[LANES * k + row - rows.start[k]] * rw.lam[row]
-            grown = target[row] + yielded + rw.held[CURVED, row]
+            grown = rw.held[TURNED, row] * (target[row] + yielded) + rw.held[CURVED, row]
             rw.grown[stage, 0, row], rw.grown[stage, 1, row] = rw.held[CORRECTED, row] + gh * grown, grown

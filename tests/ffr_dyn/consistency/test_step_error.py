@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+import ffr_dyn as fd
 from ffr_dyn.analyses.forward import forward
 from ffr_dyn.compile.scene_tables import compile_scene
 from ffr_dyn.consistency.step_error import (
@@ -232,3 +233,25 @@ def test_a_pendulum_that_stands_on_its_head_falls_by_chance(plane):
     assert by_chance["errors"]["j.angle"][1] >= 1.0
     assert not any("grows from rounding" in note for note in known["notes"])
     assert known["errors"]["j.angle"][1] < 1e-3
+
+
+def test_work_that_is_added_up_too_seldom_is_told():
+    """Of a stop that is struck between the states that work is added up from, whatever the tolerance: the work is the change
+    of the energy."""
+    ball = rigid_body("ball", mass=1.0, inertia=(1, 1, 1), points={"o": np.zeros(3)})
+    dropped = Scene(
+        (Body("ball", ball, position=(0, 0, 0.5)),),
+        (Joint("rail", "translational", "ground.O", "ball.o"),),
+        forces=(
+            fd.JointStop("floor", "rail", stiffness=2e4, entry=2e-3, lower=0.0, damping=30.0, coordinate="stroke"),
+        ),
+        ground={"O": (0, 0, 0)},
+        gravity=(0, 0, -9.81),
+    )
+    method = fd.DormandPrince(fd.Tolerances(1e-9, position=1e-10, velocity=1e-8))
+    found = fd.forward(dropped, end=1.5, output_step=0.01, method=method, outputs=("default", "*.work"))
+    energy = found["energy.total"]
+    true = np.abs(found["floor.work"] - (energy - energy[0])).max()
+    told = found.attributes["errors"]
+    assert true > 100 * told["energy.total"][0]
+    assert 0.3 < told["floor.work"][0] / true < 5

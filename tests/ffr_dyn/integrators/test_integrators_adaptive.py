@@ -9,6 +9,7 @@ import pytest
 from synthetic import cloud
 from test_analyses_references import END, andrews
 
+import ffr_dyn as fd
 from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.analyses.settings import Settings
 from ffr_dyn.integrators import RK4, ROS3, AdaptiveROS3, DormandPrince, Tolerances, tolerances
@@ -138,3 +139,36 @@ def test_scene_files_keep_them(kind, tmp_path):
         (tmp_path / "b.toml").write_text("\n".join([*lines[:at], extra, *lines[at:]]))
         with pytest.raises(InputError, match=words):
             load_scene(tmp_path / "b.toml")
+
+
+def _floor(kind):
+    """A hard floor, 2e4 N/m: its declaration among the fields of a scene."""
+    if kind == "stop":
+        stop = fd.JointStop("floor", "rail", stiffness=2e4, entry=2e-3, lower=0.0, coordinate="stroke")
+        return {"forces": (stop,)}
+    if kind == "curve":
+        curve = fd.Curve([-0.02, -0.002, 0.0, 0.1], [-380.0, -20.0, 0.0, 0.0])
+        return {"forces": (fd.JointSpring("floor", "rail", stiffness=curve, coordinate="stroke"),)}
+    push = fd.Load("floor", "ball.o", function=lambda t, state: (0, 0, 2e4 * max(-state.position("ball.o")[2], 0.0)))
+    return {"loads": (push,)}
+
+
+@pytest.mark.parametrize("tolerance", [1e-4, 1e-5, 1e-6, 1e-8])
+@pytest.mark.parametrize("kind", ["stop", "curve", "function"])
+@pytest.mark.parametrize("method", [fd.AdaptiveROS3, fd.DormandPrince])
+def test_a_ball_that_bounces_keeps_its_energy(method, kind, tolerance):
+    """In free flight steps are long, and one may end in the floor that none of its stages has met."""
+    ball = fd.rigid_body("ball", mass=1.0, inertia=(1, 1, 1), points={"o": (0, 0, 0)})
+    dropped = fd.Scene(
+        (fd.Body("ball", ball, position=(0, 0, 0.5)),),
+        (fd.Joint("rail", "translational", "ground.O", "ball.o"),),
+        ground={"O": (0, 0, 0)},
+        gravity=(0, 0, -9.81),
+        **_floor(kind),
+    )
+    method = method(fd.Tolerances(tolerance, position=tolerance, velocity=tolerance))
+    found = fd.forward(dropped, end=3.0, output_step=0.01, method=method, check=False)
+    height = found["ball.R"][:, 2]
+    flying = found["energy.total"][height > 0.01]
+    assert height.min() < -0.01
+    assert np.abs(flying / flying[0] - 1).max() < max(1000 * tolerance, 1e-5)

@@ -11,6 +11,7 @@ from synthetic import cloud
 from test_dyn_forces import PAIRS, free_pair, loaded, symmetric
 from test_dyn_kernels import moved, random_state
 
+import ffr_dyn as fd
 from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.compile.engine import new_engine
 from ffr_dyn.compile.scene_tables import compile_scene
@@ -487,3 +488,22 @@ def test_a_bushing_between_two_flexible_bodies_keeps_them_together():
     result = integrate(scene, end=0.5, output_step=0.05, method=ROS2(1e-3))
     total = result["energy.total"] + result["energy.springs"]
     assert (np.diff(total) <= 1e-9 * total[0]).all()
+
+
+@pytest.mark.parametrize("method", [fd.ROS2(2e-3), fd.ROS3(2e-3), fd.AdaptiveROS3()])
+def test_a_spring_whose_length_passes_zero_is_one_along_the_line(method):
+    """Its direction turns round there; without free length that changes nothing."""
+    mass = fd.rigid_body("mass", mass=2.0, inertia=(1, 1, 1), points={"o": (0, 0, 0)})
+    rail = fd.Scene(
+        (fd.Body("mass", mass, position=(0.3, 0, 0)),),
+        (fd.Joint("rail", "translational", "ground.O", "mass.o", axis=(1, 0, 0)),),
+        ground={"O": (0, 0, 0)},
+    )
+    line = replace(rail, springs=(fd.SpringDamper("spring", "ground.O", "mass.o", stiffness=50.0, damping=0.4),))
+    along = fd.JointSpring("spring", "rail", stiffness=50.0, damping=0.4, coordinate="stroke")
+    one, other = (
+        fd.forward(scene, end=5.0, output_step=0.01, method=method, check=False)["mass.R"]
+        for scene in (line, replace(rail, forces=(along,)))
+    )
+    assert (np.diff(np.sign(one[:, 0])) != 0).sum() == 8
+    np.testing.assert_allclose(one, other, rtol=0, atol=1e-10)

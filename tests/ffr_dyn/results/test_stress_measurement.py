@@ -10,7 +10,7 @@ import pytest
 import ffr_prep as fp
 from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.analyses.settings import Settings
-from ffr_dyn.consistency.assemble import flattened
+from ffr_dyn.consistency.assemble import assemble, flattened
 from ffr_dyn.functions.time_functions import harmonic
 from ffr_dyn.integrators import ROS2
 from ffr_dyn.integrators.stabilisation import Projection
@@ -86,6 +86,14 @@ def test_measured_section_forces_are_those_recovered_afterwards(run):
     shear = section_histories(run, "boom", 0)["boom.element_0.first.force"]
     for name, expected in (("bending", bending), ("shear", shear)):
         np.testing.assert_allclose(run[f"measured.{name}"], expected, rtol=0, atol=1e-12 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("measurement", [MEASUREMENTS[0], SectionMeasurement("pull", "boom", MIDDLE, what="force")])
+def test_what_shapes_leave_out_of_them_is_told(boom, measurement):
+    """Two modes hold no tension that grows towards the hub."""
+    notes = assemble(swinging(boom, measurements=(measurement,))).notes
+    assert any("'boom': its shapes leave out stress of its own inertia" in note for note in notes)
+    assert not any("leave out" in note for note in assemble(swinging(boom, measurements=())).notes)
 
 
 def test_they_have_units_and_are_saved(run, tmp_path):

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from synthetic import cloud
 
+import ffr_dyn as fd
 from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.compile.engine import evaluate_at, new_engine
 from ffr_dyn.compile.scene_tables import compile_scene
@@ -177,3 +178,76 @@ def test_couplings_that_cannot_be_are_refused(change, words):
         replace(scene, couplings=(replace(scene.couplings[0], **change),))
     for word in ["'gear'", *words]:
         assert word in str(caught.value)
+
+
+@pytest.mark.parametrize("analysis", [fd.kinematic, fd.inverse, fd.forward])
+@pytest.mark.parametrize("driven", ["3 + t", "7 + t", "25 + 3 * t", "-40 - 2 * t", "0.2 * t"])
+def test_couplings_hold_in_the_turns_that_a_driver_tells(driven, analysis):
+    """A pinion drives a rack; its wheel drives another half as fast, on a screw."""
+    slide = rigid_body("rack", mass=2.0, inertia=(1, 1, 1), points={"o": np.zeros(3)})
+    train = Scene(
+        (
+            Body("pinion", wheel("pinion", 0.02)),
+            Body("rack", slide, position=(0.3, 0.1, 0)),
+            Body("wheel", wheel("wheel", 0.05), position=(0.3, 0.1, 0)),
+            Body("nut", wheel("nut", 0.01)),
+        ),
+        (
+            Joint("turn", "revolute", "ground.O", "pinion.o"),
+            Joint("slide", "translational", "ground.P", "rack.o", axis=(1.0, 0, 0)),
+            Joint("axle", "revolute", "ground.P", "wheel.o"),
+            Joint("thread", "screw", "ground.O", "nut.o", pitch=0.05),
+        ),
+        drivers=(Driver("motor", "turn", fd.formula(driven)),),
+        couplings=(
+            Coupling("teeth", "turn.angle", "slide.stroke", 0.04, offset=0.2),
+            Coupling("gear", "turn.angle", "axle.angle", -17 / 41, offset=0.1),
+            Coupling("belt", "axle.angle", "thread.angle", 0.5),
+        ),
+        ground=GROUND,
+    )
+    result = analysis(train, end=1.0, output_step=0.1)
+    angle = eval(driven, {"t": result.time})
+    geared = 0.1 - 17 / 41 * angle
+    for name, expected in (("slide.stroke", 0.2 + 0.04 * angle), ("thread.stroke", 0.025 * geared / (2 * np.pi))):
+        np.testing.assert_allclose(result[name], expected, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(np.exp(1j * result["axle.angle"]), np.exp(1j * geared), rtol=0, atol=1e-9)
+
+
+def test_the_rack_is_drawn_where_it_is_meant():
+    """Drawn four turns on, it is not moved to where it would be without them."""
+    from ffr_dyn.consistency.assemble import assemble
+
+    slide = rigid_body("rack", mass=2.0, inertia=(1, 1, 1), points={"o": np.zeros(3)})
+    rack = Scene(
+        (Body("pinion", wheel("pinion", 0.02), rotation=(0, 0, 25.0)), Body("rack", slide, position=(1.0, 0, 0))),
+        (
+            Joint("turn", "revolute", "ground.O", "pinion.o"),
+            Joint("slide", "translational", "ground.O", "rack.o", axis=(1.0, 0, 0)),
+        ),
+        couplings=(Coupling("teeth", "turn.angle", "slide.stroke", 0.04),),
+        ground=GROUND,
+    )
+    for drivers in ((), (Driver("motor", "turn", polynomial(25.0)),)):
+        found = assemble(replace(rack, drivers=drivers))
+        assert not any("assembly" in note for note in found.notes)
+
+
+def test_turns_of_a_driver_that_a_spring_does_not_count_are_told():
+    spun = Scene(
+        (Body("a", wheel("a", 0.02)),),
+        (Joint("turn", "revolute", "ground.O", "a.o"),),
+        drivers=(Driver("motor", "turn", fd.formula("10 * t")),),
+        forces=(fd.JointSpring("coil", "turn", stiffness=2.0),),
+        ground=GROUND,
+    )
+    wound = fd.forward(spun, end=0.5, output_step=0.1, start=0.0)
+    assert not any("whole turns" in note for note in wound.attributes["notes"])
+    torque = wound["coil.torque"][-1]
+    assert torque == pytest.approx(-10.0, rel=1e-9)
+    later = fd.static(spun, time=0.5)
+    assert any("begins 1 whole turns on, and 'coil'" in note for note in later.attributes["notes"])
+    counted = replace(spun, forces=(replace(spun.forces[0], turns=1),))
+    found = fd.static(counted, time=0.5)
+    assert found["coil.torque"][0] == pytest.approx(torque, rel=1e-9)
+    assert not any("whole turns" in note for note in found.attributes["notes"])
