@@ -22,13 +22,22 @@ from ffr_dyn.analyses.rotating.periodic import periodically
 from ffr_dyn.analyses.settings import Settings
 from ffr_dyn.consistency.assemble import Assembled, assemble
 from ffr_dyn.consistency.quasi_static import quasi_static
-from ffr_dyn.consistency.step_error import Beside, StepError, from_rounding, jumps, step_errors, too_coarse
+from ffr_dyn.consistency.step_error import (
+    A_FORMULA,
+    Beside,
+    StepError,
+    from_rounding,
+    step_errors,
+    too_coarse,
+    untold_breaks,
+)
 from ffr_dyn.consistency.unresolved import Vibrations, lasting, leading, vibrations
 from ffr_dyn.functions.stopwatch import Stopwatch
 from ffr_dyn.functions.together import Say, together
 from ffr_dyn.integrators import Integrator, Within, stepped
 from ffr_dyn.integrators.ros2 import Twin
 from ffr_dyn.integrators.stabilisation import Projection, Stabilisation
+from ffr_dyn.integrators.tolerances import tightened
 from ffr_dyn.linear.steady_state import steadily
 from ffr_dyn.results.file import load_result, with_attributes
 from ffr_dyn.results.result import Result
@@ -43,8 +52,10 @@ PROJECTED = (
 )
 SURE = 2  # order that linearly implicit methods keep where elastic forces are stiff
 PARTLY_STIFF = 2.15  # order of those of order three, of an output of which that is not known
+OVER_BREAKS = 0.5  # the same where a break lies within steps: its weights, of both signs, let that err by more
 SLOW = 0.7  # a ringing output's error falls slower than the step to this power,
 IN_COMPANY = 1.4  # or to this one, if it is of vibration, where others ring
+SHOWN = 3  # times in a note
 QUICK = 1e7  # microseconds of the further runs, by `_cost`, up to which they are made unasked
 
 Beginning = Literal["as-given", "quasi-static", "steady", "periodic"]  # the default and the others
@@ -111,10 +122,10 @@ class _Runs:
         return vibrations(self.assembled, self.start)
 
     @cached_property
-    def jumps(self) -> bool:
-        """Whether a force jumps at a time."""
-        system = self.assembled.system
-        return jumps(system.scene, system.model.functions, self.start, self.how["end"])
+    def untold(self) -> dict[str, list[float]]:
+        """When [s] functions of time break without steps that end there, by what they are for."""
+        count = round((self.how["end"] - self.start) / self.output_step)
+        return untold_breaks(self.assembled.system, np.linspace(self.start, self.how["end"], count + 1))
 
     def run(self, method: Integrator, **more: Any) -> Result:
         """One run."""
@@ -293,7 +304,9 @@ def _told(runs: _Runs, trial: _Trial, other: Any, *longer: Any) -> _Trial:
     """The run with its errors, also by what `_further` returned."""
     if _failed(other):
         return replace(trial, errors={})
-    order = 1 if runs.jumps else PARTLY_STIFF if _share(trial.method) == 0.5 else trial.method.order
+    order = PARTLY_STIFF if _share(trial.method) == 0.5 else trial.method.order
+    if runs.untold:
+        order = OVER_BREAKS if trial.method.order == 3 else 1
     twins = (*trial.twins, *(twin for twin in longer if not _failed(twin)))
     return replace(trial, twins=twins, errors=step_errors(trial.result, other, order, twins))
 
@@ -303,7 +316,8 @@ def _further(
 ) -> list[Callable[[Say], Beside | None]]:
     """The further runs that tell the error of a run beside its twin: one with another step, and, beside a twin of half the
     step, one with a longer step; those of the last trial if its step is not too far."""
-    near = next((one for one in reversed(earlier) if one.twins and count <= _leap(method) * one.count), None)
+    far = 2 if runs.untold else _leap(method)
+    near = next((one for one in reversed(earlier) if one.twins and count <= far * one.count), None)
     if near is not None:
         ratio = count / near.count
         known = [Beside(near.result, ratio), *(Beside(one.result, ratio * one.ratio) for one in near.twins[:1])]
@@ -313,13 +327,14 @@ def _further(
 
 
 def _other(runs: _Runs, method: Any, count: int, say: Say) -> Beside:
-    """The run with another step: about twice the step, or four times of a method of higher order, where elastic forces are
-    implicit and that is part of a row, else half of it; with a tenth of the tolerance of a method that chooses its steps."""
+    """The run with another step: about twice the step, or four times of a method of higher order unless a break lies within
+    steps, where elastic forces are implicit and that is part of a row, else half of it; with a tenth of the tolerances of a
+    method that chooses its steps."""
     if method.controlled:
-        tolerances = replace(method.tolerances, relative=method.tolerances.relative / 10)
-        return Beside(runs.run(replace(method, tolerances=tolerances), progress=say), 10.0 ** (-1.0 / method.order))
+        finer = replace(method, tolerances=tightened(method.tolerances, 10))
+        return Beside(runs.run(finer, progress=say), 10.0 ** (-1.0 / method.order))
     if method.implicit and count > 1:
-        fewer = -(-count // (4 if method.order > SURE else 2))
+        fewer = -(-count // (4 if method.order > SURE and not runs.untold else 2))
         try:
             return Beside(runs.run(replace(method, step=runs.output_step / fewer), progress=say), count / fewer)
         except ComputationError:
@@ -357,6 +372,7 @@ def _finished(runs: _Runs, trial: _Trial, path: str | Path | None, ringing: Set[
     notes = [
         *result.attributes["notes"],
         *unseen,
+        *(_untold(runs) if trial.errors else ()),
         *_unresolved(runs, trial, ringing),
         *_coarse(result),
         *_unstable(result, grown),
@@ -404,6 +420,21 @@ def _unseen(trial: _Trial) -> list[str]:
     return [
         "the error told leaves out vibration that the steps damp: the run that shows it has failed; take a smaller step"
     ]
+
+
+def _untold(runs: _Runs) -> list[str]:
+    """Notes on breaks at which no steps end."""
+    return [
+        f"{what} jumps or has a kink at t = {', '.join(f'{t:.6g}' for t in times[:SHOWN])}"
+        f"{', ...' * (len(times) > SHOWN)} s, where no step ends, and steps are of first order there; {_way_to_tell(what)}"
+        for what, times in runs.untold.items()
+    ]
+
+
+def _way_to_tell(what: str) -> str:
+    if what == A_FORMULA:
+        return "write it with abs, min, max or step, at whose kinks they end"
+    return "give its times, as in fd.user(function, breaks=[0.5])"
 
 
 def _unresolved(runs: _Runs, trial: _Trial, ringing: Set[str]) -> list[str]:
