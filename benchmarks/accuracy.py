@@ -32,10 +32,10 @@ from ffr_gallery.scene_set import CASES, Case
 
 from benchmarks.unseen import UNSEEN
 from ffr_dyn.analyses.checkpoint import fingerprint
-from ffr_dyn.analyses.forward import DRIVING, PLACES, forward
+from ffr_dyn.analyses.forward import DRIVING, forward
 from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.consistency.assemble import assemble
-from ffr_dyn.consistency.step_error import largest_difference, ranges, roundings
+from ffr_dyn.consistency.step_error import PLACES, largest_difference, ranges, roundings
 from ffr_dyn.consistency.unresolved import vibrations
 from ffr_dyn.integrators import RK4, Within, method_named
 from ffr_dyn.integrators.stabilisation import Projection

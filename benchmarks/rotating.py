@@ -432,9 +432,9 @@ def periods() -> Iterator[Figure]:
 
 
 def _periodic(who: str, scene: fd.Scene, deflections: str, period: float) -> Iterator[Figure]:
-    method = fd.ROS3(period / 1000)
+    method = fd.ROS3(period / 4000)
     how = {"output_step": period / 100, "method": method, "stabilisation": fd.Projection(1e-14), "check": False}
-    found, spent = _least_time(lambda: fd.periodic(scene, method=method))
+    found, spent = _least_time(lambda: fd.periodic(scene, method=method, check=False))
     turned, thirty = _least_time(lambda: fd.forward(scene, end=30 * period, **how))
     q = turned[deflections][-101:]
     off = np.abs(found[deflections] - q).max() / np.abs(q).max()

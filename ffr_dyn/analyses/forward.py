@@ -6,6 +6,7 @@ looked for that is short enough.
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable, Mapping, Sequence, Set
 from dataclasses import dataclass, field, replace
@@ -24,12 +25,21 @@ from ffr_dyn.consistency.assemble import Assembled, assemble
 from ffr_dyn.consistency.quasi_static import quasi_static
 from ffr_dyn.consistency.step_error import (
     A_FORMULA,
+    BEYOND,
+    OVER_BREAKS,
+    PARTLY_STIFF,
+    PLACES,
     Beside,
     StepError,
+    begins_alone,
     from_rounding,
+    of_the_range,
+    percent,
     step_errors,
     too_coarse,
     untold_breaks,
+    with_start,
+    worst,
 )
 from ffr_dyn.consistency.unresolved import Vibrations, lasting, leading, vibrations
 from ffr_dyn.functions.stopwatch import Stopwatch
@@ -51,8 +61,6 @@ PROJECTED = (
     1e-8  # of the accuracy [m, -], that constraints are closed to: 1e-9 m moved forces by up to 1e-3 of their range
 )
 SURE = 2  # order that linearly implicit methods keep where elastic forces are stiff
-PARTLY_STIFF = 2.15  # order of those of order three, of an output of which that is not known
-OVER_BREAKS = 0.5  # the same where a break lies within steps: its weights, of both signs, let that err by more
 SLOW = 0.7  # a ringing output's error falls slower than the step to this power,
 IN_COMPANY = 1.4  # or to this one, if it is of vibration, where others ring
 SHOWN = 3  # times in a note
@@ -61,8 +69,6 @@ QUICK = 1e7  # microseconds of the further runs, by `_cost`, up to which they ar
 Beginning = Literal["as-given", "quasi-static", "steady", "periodic"]  # the default and the others
 
 # What a step is to keep within the accuracy always, and what where it does not ring.
-_LOADS = re.compile(r"\.(force|moment|torque|tension|effort)$")
-PLACES = re.compile(r"\.(position|R|p|angle|stroke|orientation)$")
 DRIVING = re.compile(r"\.(displacement|rotation|force|moment|effort|torque|tension)$|^measured\.")
 
 
@@ -304,11 +310,15 @@ def _told(runs: _Runs, trial: _Trial, other: Any, *longer: Any) -> _Trial:
     """The run with its errors, also by what `_further` returned."""
     if _failed(other):
         return replace(trial, errors={})
-    order = PARTLY_STIFF if _share(trial.method) == 0.5 else trial.method.order
+    share, failed = _share(trial.method), any(isinstance(twin, ComputationError) for twin in longer)
+    too_long = failed or (share is not None and not trial.twins)  # steps for an order, where twins fail
+    order = 1 if too_long else PARTLY_STIFF if share == 0.5 else trial.method.order
     if runs.untold:
         order = OVER_BREAKS if trial.method.order == 3 else 1
     twins = (*trial.twins, *(twin for twin in longer if not _failed(twin)))
-    return replace(trial, twins=twins, errors=step_errors(trial.result, other, order, twins))
+    errors = step_errors(trial.result, other, order, twins)
+    start = _start(runs, trial.method, trial.result, trial.twins[0]) if trial.twins else ()
+    return replace(trial, twins=twins, errors=with_start(errors, trial.result, *start) if start else errors)
 
 
 def _further(
@@ -355,6 +365,22 @@ def _twin(runs: _Runs, method: Integrator, share: float, say: Say) -> Beside:
     return Beside(runs.run(Twin(step, lasting(runs.vibrations, step)), progress=say), share)
 
 
+def _start(runs: _Runs, method: Integrator, result: Result, twin: Beside) -> tuple[Result, ...]:
+    """The steps to the first row and a little beyond as rows, and those of a twin with half the twin's step, where what
+    vibrates then is gone soon; () elsewhere, and where they fail."""
+    if not begins_alone(result, twin.result):
+        return ()
+    count = round(runs.output_step / method.step)
+    steps = min(count + math.ceil(BEYOND * count), round((runs.how["end"] - runs.start) / method.step))
+    share = 0.5 * twin.ratio * method.step
+    fine = Twin(share, lasting(runs.vibrations, share))
+    span = {"output_step": method.step, "end": runs.start + steps * method.step, "progress": None}
+    try:
+        return runs.run(method, **span), runs.run(fine, **span)
+    except (ComputationError, InputError):  # the latter where steps are rounding beside the time of the start
+        return ()
+
+
 def _longer_twin(runs: _Runs, method: Integrator, count: int, say: Say) -> Beside | None:
     """With about twice the step, so many of which are a row; None where a row is one step already."""
     return _twin(runs, method, count / -(-count // 2), say) if count > 1 else None
@@ -381,7 +407,7 @@ def _finished(runs: _Runs, trial: _Trial, path: str | Path | None, ringing: Set[
     told = {name: [e.error, e.of_range] for name, e in trial.errors.items()}
     more: dict[str, Any] = {"notes": notes, "errors": told}
     if trial.errors:
-        more["accuracy"] = _at_least(trial.errors) if unseen else _worst(trial.errors)
+        more["accuracy"] = _at_least(trial.errors) if unseen else worst(trial.errors)
         more["effort"] = sum(runs.work) / max(1, result.attributes["evaluations"])
     attributes = {**result.attributes, **more}
     if path is not None:
@@ -389,28 +415,10 @@ def _finished(runs: _Runs, trial: _Trial, path: str | Path | None, ringing: Set[
     return replace(result, attributes=attributes)
 
 
-def _worst(errors: Mapping[str, StepError]) -> str:
-    name = max(errors, key=lambda one: errors[one].of_range)
-    said = [f"step: within {_of_the_range(errors[name].of_range)} of {name}"]
-    for words, kind in (("positions and angles", PLACES), ("forces and moments", _LOADS)):
-        of_kind = [error.of_range for one, error in errors.items() if kind.search(one)]
-        if of_kind and not kind.search(name):
-            said.append(f"{words} within {_percent(max(of_kind))}")
-    return "; ".join(said)
-
-
 def _at_least(errors: Mapping[str, StepError]) -> str:
     """Of errors that leave out what the steps damp."""
     name = max(errors, key=lambda one: errors[one].of_range)
-    return f"step: not known; {name} is off by {_of_the_range(errors[name].of_range)} or more"
-
-
-def _of_the_range(share: float) -> str:
-    return f"{_percent(share)} of the range" if share < 1 else f"{float(f'{share:.2g}'):g} times the range"
-
-
-def _percent(share: float) -> str:
-    return f"{float(f'{100 * share:.2g}'):g} %"
+    return f"step: not known; {name} is off by {of_the_range(errors[name].of_range)} or more"
 
 
 def _unseen(trial: _Trial) -> list[str]:
@@ -451,7 +459,7 @@ def _unresolved(runs: _Runs, trial: _Trial, ringing: Set[str]) -> list[str]:
     times = (4 / step) / ((4 if method.order > 2 else 2) / method.step)
     return [
         f"vibration{words} that a step of {method.step:.3g} s does not resolve carries "
-        f"{_of_the_range(told[name].of_range)} of {name}{_others(len(told) - 1)}; rk4 with a step of {step:.2g} s resolves "
+        f"{of_the_range(told[name].of_range)} of {name}{_others(len(told) - 1)}; rk4 with a step of {step:.2g} s resolves "
         f"it, for about {max(times, 1):.2g} times the time of this run{_without_shock(runs.begin)}"
     ]
 
@@ -467,7 +475,7 @@ def _coarse(result: Result) -> list[str]:
     name = max(found, key=lambda one: found[one])
     return [
         f"rows every {float(result.attributes['output_step']):g} s are too coarse for what {name} does"
-        f"{_others(len(found) - 1)}: between them it is up to {_percent(found[name])} of its range off the curve through "
+        f"{_others(len(found) - 1)}: between them it is up to {percent(found[name])} of its range off the curve through "
         "them, or more; take a smaller output_step to see it"
     ]
 
@@ -509,7 +517,7 @@ def _searched(runs: _Runs, within: Within, kept: dict[str, Any], count: int) -> 
                 raise
             count *= FIRST
             continue
-        if not trial.errors or _excess(trial, ringing, trials) <= within.accuracy:
+        if not trial.errors or count >= FINEST or _excess(trial, ringing, trials) <= within.accuracy:
             trial = _told(runs, trial, *runs.together(_further(runs, method, count, trials), leader=False))
         excess = _excess(trial, ringing, trials) / within.accuracy
         trials.append(trial)

@@ -20,6 +20,7 @@ from ffr_dyn.analyses.outcome import output_times, result_of
 from ffr_dyn.analyses.registry import OverTime
 from ffr_dyn.analyses.settings import Settings
 from ffr_dyn.closing.limits import with_limits
+from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.consistency import doubts
 from ffr_dyn.consistency.assemble import Assembled, assemble
 from ffr_dyn.consistency.evaluation import Evaluation, Evaluator, copied, evaluate, evaluator, joined, total_mass_matrix
@@ -45,14 +46,15 @@ AT_REST = 1e-5  # the same, absolute, of a position that drivers hold
 
 @dataclass(frozen=True)
 class _Pose:
-    """A position on the path: state, conditioning (smallest singular value) and orientation (sign of the determinant)."""
+    """A position on the path: state, conditioning (smallest singular value), orientation (sign of the determinant), and the
+    motion (V,) that comes free where it is singular."""
 
     time: float
     x: Array
     v: Array
     conditioning: float
     sign: float
-    joint: str
+    motion: Array
 
 
 @dataclass(frozen=True)
@@ -103,7 +105,7 @@ def kinematic(
             progress(float(time))
     record = _recorded(assembled, poses)
     notes = [*assembled.notes, *_undeformed_notes(scene)]
-    notes += doubts.checked("kinematic", assembled, record, {doubts.SINGULAR: _singular_notes(followed)})
+    notes += doubts.checked("kinematic", assembled, record, {doubts.SINGULAR: _singular_notes(at.system, followed)})
     attributes = {
         **described(scene),
         "analysis": "kinematic",
@@ -178,7 +180,12 @@ def _pose(at: Evaluator, time: float, x: Array, v: Array) -> _Pose:
     still = evaluate(at, time, x, np.zeros_like(v))
     values, sign, motion = _conditioning(at, still, x)
     v = v + np.linalg.lstsq(still.jacobian, -still.nu - still.jacobian @ v, rcond=SINGULAR)[0]
-    return _Pose(time, x, v, values, sign, named_motion(at.system.scene, at.system.layout, x, motion))
+    return _Pose(time, x, v, values, sign, motion)
+
+
+def _leading(system: System, pose: _Pose) -> str:
+    """The joint coordinate that leads the motion which comes free."""
+    return named_motion(system.scene, system.layout, pose.x, pose.motion)
 
 
 def _conditioning(at: Evaluator, now: Evaluation, x: Array) -> tuple[float, float, Array]:
@@ -196,8 +203,8 @@ def _conditioning(at: Evaluator, now: Evaluation, x: Array) -> tuple[float, floa
 def _locked(at: Evaluator, pose: _Pose) -> ComputationError:
     drivers = ", ".join(repr(driver.name) for driver in at.system.scene.drivers)
     return ComputationError(
-        f"at t = {pose.time:.6g} s the mechanism locks: {pose.joint} is at a dead point beyond which no position meets the "
-        f"joints and drivers ({drivers}); keep the driven motion within reach, or drive another joint"
+        f"at t = {pose.time:.6g} s the mechanism locks: {_leading(at.system, pose)} is at a dead point beyond which no "
+        f"position meets the joints and drivers ({drivers}); keep the driven motion within reach, or drive another joint"
     )
 
 
@@ -207,24 +214,24 @@ def _recorded(assembled: Assembled, poses: list[_Pose]) -> Record:
     rows = []
     for pose in poses:
         if evaluate(at, pose.time, pose.x, to_global_axes(assembled.system.layout, pose.x, pose.v)).singular:
-            raise _undetermined(pose)
+            raise _undetermined(at.system, pose)
         rows.append(copied(at.record))
     record = with_limits(assembled.system, assembled.all_rows, with_all_reactions(assembled, joined(rows)))
     for row, pose in enumerate(poses):
         lost = pose.conditioning < SINGULAR * best and not np.isfinite(record.vd[row]).all()
         if lost or (pose.conditioning < AT_REST and not record.v[row].any()):  # which is on no path
-            raise _undetermined(pose)
+            raise _undetermined(at.system, pose)
     return record
 
 
-def _undetermined(pose: _Pose) -> ComputationError:
+def _undetermined(system: System, pose: _Pose) -> ComputationError:
     return ComputationError(
-        f"at t = {pose.time:.6g} s the position is singular: the drivers do not determine the motion of {pose.joint}; choose "
-        "output times that miss it, or drive another joint"
+        f"at t = {pose.time:.6g} s the position is singular: the drivers do not determine the motion of "
+        f"{_leading(system, pose)}; choose output times that miss it, or drive another joint"
     )
 
 
-def _singular_notes(poses: list[_Pose]) -> list[str]:
+def _singular_notes(system: System, poses: list[_Pose]) -> list[str]:
     """Positions that are nearly singular, and those that were crossed: the determinant changes its sign."""
     best = max(pose.conditioning for pose in poses)
     notes = []
@@ -232,9 +239,12 @@ def _singular_notes(poses: list[_Pose]) -> list[str]:
         least = all(pose.conditioning <= other.conditioning for other in poses[max(k - 1, 0) : k + 2])
         if k and pose.sign * poses[k - 1].sign < 0:
             time = _crossing(poses[k - 1], pose)
-            notes.append(f"a singular position was crossed at about t = {time:.4g} s: {pose.joint} could branch there")
+            said = f"a singular position was crossed at about t = {time:.4g} s"
         elif least and pose.conditioning < NEAR * best:
-            notes.append(f"nearly singular at t = {pose.time:.6g} s: {pose.joint} could branch there")
+            said = f"nearly singular at t = {pose.time:.6g} s"
+        else:
+            continue
+        notes.append(f"{said}: {_leading(system, pose)} could branch there")
     return notes
 
 

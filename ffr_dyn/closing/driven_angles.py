@@ -16,7 +16,7 @@ import numpy as np
 from ffr_dyn.closing.constraints import Constraints
 from ffr_dyn.closing.going_on import going_on
 from ffr_dyn.closing.positions import LARGEST_TURN, close_velocities, largest_turn
-from ffr_dyn.equations.kinematics import marker_direction
+from ffr_dyn.equations.kinematics import marker_directions
 from ffr_dyn.equations.layout import moved, to_body_axes
 from ffr_dyn.scene.joints import DRIVEN_ANGLE
 from ffr_prep.common.arrays import Array
@@ -38,14 +38,14 @@ class DrivenAngle:
 
 def driven_angles(constraints: Constraints, x: Array) -> list[DrivenAngle]:
     """All driven angles at x; what is left is within half a turn, and nothing where the joint has no angle."""
-    seen = partial(marker_direction, constraints.scene, constraints.place, x)
+    seen = partial(marker_directions, constraints.scene, constraints.place, x)
     functions, found = iter(constraints.functions.tolist()), []
     for block in constraints.blocks:
         for word in block.words:
             function = next(functions)
             if word.kind == DRIVEN_ANGLE:
-                f, g = (seen(block.markers[0], word.axes[k]) for k in (0, 1))
-                f_j, value = seen(block.markers[1], word.axes[2]), float(constraints.drives[function, 0])
+                f, g = seen(block.markers[0], word.axes[0], word.axes[1])
+                (f_j,), value = seen(block.markers[1], word.axes[2]), float(constraints.drives[function, 0])
                 left = value - float(np.arctan2(g @ f_j, f @ f_j))
                 found.append(DrivenAngle(function, value, left - TURN * round(left / TURN)))
     return found

@@ -98,17 +98,19 @@ def weights(scene: Scene, place: Layout, x: Array, elastic: bool, dense: bool) -
 def _root(body: Body, q: Array, rigid: tuple[int, ...], elastic: bool) -> Array:
     """(6 + n, 6 + n) of one body, which bodies of one model and state share."""
     n = body.model.n
-    active = [*rigid, *range(6, 6 + n if elastic else 6)]
+    active = (*rigid, *range(6, 6 + n if elastic else 6))
 
     def make() -> Array:
-        values, vectors = np.linalg.eigh(mass_matrix(kept_integrals(body), q)[active][:, active])
+        columns = np.array(active)
+        rows = columns[:, None]
+        values, vectors = np.linalg.eigh(mass_matrix(kept_integrals(body), q)[rows, columns])
         root = np.zeros((6 + n, 6 + n))
-        root[np.ix_(active, active)] = vectors / np.sqrt(np.maximum(values, 1e-12 * values.max()))
+        root[rows, columns] = vectors / np.sqrt(np.maximum(values, 1e-12 * values.max()))
         return root
 
     if q.any():
         return make()
-    return remembered(body.model, ("root of mass", body.dropped, body.stiffening, tuple(active)), make)
+    return remembered(body.model, ("root of mass", body.dropped, body.stiffening, active), make)
 
 
 def _step(constraints: Constraints, x: Array, rows: RowsAt, target: Array, elastic: bool) -> Array:

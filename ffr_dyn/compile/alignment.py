@@ -6,8 +6,10 @@ ones all begin at the same place of a page, which the processor takes for one an
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import accumulate
 from typing import Any, Generic, TypeVar
 
@@ -17,9 +19,16 @@ from ffr_dyn.kernels.simd.table_address import address_of, pack, places_of_addre
 from ffr_prep.common.arrays import Array
 
 T = TypeVar("T", bound=tuple[Any, ...])
-Form = tuple[tuple[int, ...], Any, int]
 
 LINE = 8  # numbers of eight bytes in a cache line
+
+
+@dataclass(frozen=True)
+class Form:
+    """Where arrays begin in a piece [bytes], and the piece as one number of a structured type, whose fields they are."""
+
+    begin: list[int]
+    whole: np.dtype[Any]
 
 
 @dataclass(frozen=True)
@@ -27,7 +36,7 @@ class Piece(Generic[T]):
     """Nested named tuples with all their arrays in one piece, to be copied as often as wanted.
 
     words : as `pack` writes them;  numbers : the piece, eight bytes each
-    forms : shape, type and beginning [bytes] of every array
+    form  : of the arrays
     order : which array each field holds, one field after the other; an array that is there twice stays one
     places : of the addresses among the words
     """
@@ -35,7 +44,7 @@ class Piece(Generic[T]):
     tables: T
     words: Array
     numbers: Array
-    forms: list[Form]
+    form: Form
     order: list[int]
     places: Array
 
@@ -50,10 +59,10 @@ def in_one_piece(tables: T, but: str = "") -> Piece[T]:
 
     but : a field that is an empty tuple, of which the words are left open
     """
-    made, numbers, forms, order = _laid_out(tables)
+    made, numbers, form, order = _laid_out(tables)
     address = address_of(numbers)
-    words = pack(made, [address + forms[k][2] for k in order], but)
-    return Piece(made, words, numbers, forms, order, places_of_addresses(type(made), but))
+    words = pack(made, [address + form.begin[k] for k in order], but)
+    return Piece(made, words, numbers, form, order, places_of_addresses(type(made), but))
 
 
 def copied(piece: Piece[T]) -> tuple[T, Array]:
@@ -61,20 +70,29 @@ def copied(piece: Piece[T]) -> tuple[T, Array]:
     numbers, words = _room(piece.numbers.size), piece.words.copy()
     numbers[:] = piece.numbers
     words[piece.places] += address_of(numbers) - address_of(piece.numbers)
-    return _replaced(piece.tables, _views(numbers, piece.forms), iter(piece.order)), words
+    return _replaced(piece.tables, _views(numbers, piece.form), iter(piece.order)), words
 
 
-def _laid_out(tables: T) -> tuple[T, Array, list[Form], list[int]]:
+def _laid_out(tables: T) -> tuple[T, Array, Form, list[int]]:
     """`Piece.tables` and what follows its words."""
     arrays, fields = dict[int, Array](), list[int]()
     _gather(tables, arrays, fields)
-    begin = list(accumulate((-(-array.size // LINE) * LINE for array in arrays.values()), initial=0))
-    forms = [(array.shape, array.dtype, 8 * at) for array, at in zip(arrays.values(), begin, strict=False)]
-    numbers, place = _room(begin[-1]), {key: number for number, key in enumerate(arrays)}
-    views, order = _views(numbers, forms), [place[key] for key in fields]
+    form = _form(tuple((array.dtype, array.shape) for array in arrays.values()))
+    numbers, place = _room(form.whole.itemsize // 8), {key: number for number, key in enumerate(arrays)}
+    views, order = _views(numbers, form), [place[key] for key in fields]
     for view, array in zip(views, arrays.values(), strict=True):
         view[...] = array
-    return _replaced(tables, views, iter(order)), numbers, forms, order
+    return _replaced(tables, views, iter(order)), numbers, form, order
+
+
+@lru_cache(256)
+def _form(arrays: tuple[tuple[np.dtype[Any], tuple[int, ...]], ...]) -> Form:
+    """Of types and shapes of arrays; scenes of one structure have the same."""
+    lines = (-(-math.prod(shape) // LINE) * LINE for _, shape in arrays)
+    *begin, end = accumulate((8 * size for size in lines), initial=0)
+    names = [str(number) for number in range(len(arrays))]
+    whole = {"names": names, "formats": arrays, "offsets": begin, "itemsize": end}
+    return Form(begin, np.dtype(whole))  # type: ignore[call-overload]
 
 
 def _room(size: int) -> Array:
@@ -84,8 +102,9 @@ def _room(size: int) -> Array:
     return memory[at : at + size]
 
 
-def _views(numbers: Array, forms: list[Form]) -> list[Array]:
-    return [np.ndarray(shape, dtype, numbers, begin) for shape, dtype, begin in forms]
+def _views(numbers: Array, form: Form) -> tuple[Array, ...]:
+    """Fields of a structured number are arrays in its memory, which is a third of the work of making one after the other."""
+    return np.ndarray((), form.whole, numbers).item()  # type: ignore[no-any-return]
 
 
 def _gather(tables: Any, found: dict[int, Array], fields: list[int]) -> None:
@@ -97,7 +116,7 @@ def _gather(tables: Any, found: dict[int, Array], fields: list[int]) -> None:
             _gather(field, found, fields)
 
 
-def _replaced(tables: Any, arrays: list[Array], order: Iterator[int]) -> Any:
+def _replaced(tables: Any, arrays: Sequence[Array], order: Iterator[int]) -> Any:
     fields = [
         arrays[next(order)]
         if isinstance(field, np.ndarray)

@@ -86,18 +86,19 @@ class Blocks:
 def tables_in_blocks(owners: Sequence[Hashable], make: Callable[[int], tuple[Array, Array]]) -> Blocks:
     """Tables of one owner are made and stored once; a table of zeros starts at -1, and the kernels skip it.
 
-    make : of an owner by number: pool and plan, the pool empty where there is none
+    make : of an owner by number: pool and plan, the pool in whole rows of lanes, empty where there is none
     """
     stored: dict[Hashable, tuple[Array, Array]] = {}
     for b, owner in enumerate(owners):
         if owner not in stored:
             stored[owner] = make(b)
-    in_lanes = {owner: np.pad(pool, (0, -pool.size % LANES)) for owner, (pool, _) in stored.items()}
-    pool, first = once([in_lanes[owner] for owner in owners], owners)
+    pool, first = once([stored[owner][0] for owner in owners], owners)
     plans, first_plan = once([stored[owner][1] for owner in owners], owners)
-    zero = np.array([not stored[owner][0].size for owner in owners], dtype=bool)
+    for k, owner in enumerate(owners):
+        if not stored[owner][0].size:
+            first[k] = -1
     padded = np.concatenate([pool, np.zeros(LANES)])  # whole rows of lanes are read
-    return Blocks(padded, np.where(zero, -1, first), plans.astype(np.int64), first_plan)
+    return Blocks(padded, first, plans.astype(np.int64, copy=False), first_plan)
 
 
 NO_BLOCKS = np.zeros(0), np.zeros(0, dtype=np.int64)
@@ -149,10 +150,8 @@ def body_tables(scene: Scene, place: Layout) -> Bodies:
     PP = tables_in_blocks(in_plane, lambda b: of[b].PP_dm)
     omega2, column = once([i.omega2 for i in of], owners)
     bounds, beside = zip(*(_damping(body) for body in scene.bodies), strict=True)
-    damping, _ = once(bounds, owners)
     coupled, first = once(beside, owners)
-    P, _ = once([i.P_dm for i in of], owners)
-    rP, _ = once([i.rP_dm for i in of], owners)
+    own = sorted({owner: b for b, owner in reversed([*enumerate(owners)])}.values())  # of each owner the first
     where = np.zeros((len(of) + 1, 9), dtype=np.int64)
     where[:, IN_DAMPING] = where[-1, NORMAL] = -1
     where[:-1, IN_DAMPING] = [start if part.size else -1 for start, part in zip(first, beside, strict=True)]
@@ -164,11 +163,11 @@ def body_tables(scene: Scene, place: Layout) -> Bodies:
         where=where,
         mass=np.array([i.mass for i in of]),
         moments=np.array([i.moments for i in of]),
-        P_dm=P,
-        rP_dm=rP,
+        P_dm=_pool([of[b].P_dm for b in own]),
+        rP_dm=_pool([of[b].rP_dm for b in own]),
         PP_dm=PP.pool,
         omega2=omega2,
-        two_zeta_omega=damping,
+        two_zeta_omega=_pool([bounds[b] for b in own]),
         coupled_damping=coupled,
         blocks=PP.plans,
     )

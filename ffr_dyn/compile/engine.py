@@ -127,9 +127,12 @@ def load_at(engine: Engine, t: float, x: Array, v: Array) -> int:
     return evaluate_loads(engine.tables, t, np.ascontiguousarray(x, dtype=float), np.ascontiguousarray(v, dtype=float))
 
 
-def record_row(engine: Engine, t: float, record: Record, row: int) -> int:
-    """Evaluate the engine's state at time t as `evaluate_at` and keep it as a row. A status."""
-    status = record_state(engine.tables, t, record, row)
+def record_row(engine: Engine, t: float, record: Record, row: int, packed: Array | None = None) -> int:
+    """Evaluate the engine's state at time t as `evaluate_at` and keep it as a row. A status.
+
+    packed : `pack(record)`, for who records again and again
+    """
+    status = record_state(engine.tables, t, record if packed is None else packed, row)
     return NOT_FINITE if status == OK and not np.isfinite(record.vd[row]).all() else status
 
 

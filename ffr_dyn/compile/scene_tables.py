@@ -99,7 +99,8 @@ _SIGNATURE = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_double, ctypes.c_void_p, 
 class UserFunctions:
     """One C callback through which the kernels reach all Python functions of a scene.
 
-    Python cannot raise through compiled code: the callback reports failure, and `failure` keeps what to tell the user.
+    Python cannot raise through compiled code: the callback reports failure, and `failure` keeps what to tell the user. Where
+    there are no functions there is no callback: it refers to this object, which only the garbage collector frees then.
     """
 
     def __init__(self, callbacks: list[Callback], place: Layout, scene: Scene) -> None:
@@ -109,8 +110,8 @@ class UserFunctions:
         self.count = sum(c.size for c in callbacks)
         self.failure: str | None = None
         self.cause: BaseException | None = None
-        self._c_function = _SIGNATURE(self._call)
-        self.address = ctypes.cast(self._c_function, ctypes.c_void_p).value or 0
+        self._c_function = _SIGNATURE(self._call) if callbacks else None
+        self.address = (ctypes.cast(self._c_function, ctypes.c_void_p).value or 0) if self._c_function else 0
 
     def _call(self, t: float, x_address: int, v_address: int, out_address: int) -> int:
         x = _at(x_address, self.place.x_size)

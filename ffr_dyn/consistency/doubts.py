@@ -70,6 +70,7 @@ DRIFTED, TORN = 1e-5, 1e-2
 BESIDE = 0.1  # rad, by which a driven angle may differ
 TURNED = 0.1  # rad, or of the scene's size: h^2 times a driver's second derivative that a step bears
 DEPENDENT = 1e-8  # smallest eigenvalue of a mass matrix with ones on its diagonal
+FAR = 1e-2  # from zero, where a bound of it will do
 
 
 @dataclass(frozen=True)
@@ -266,12 +267,15 @@ def _dependent(system: System, x: Array) -> Iterator[str]:
 
 
 def _least(body: Body, moving: tuple[int, ...], q: Array) -> float:
-    """The smallest eigenvalue of a mass matrix with ones on its diagonal; that of a rigid body is always the same."""
+    """The smallest eigenvalue of a mass matrix with ones on its diagonal, or a bound below it that is far from zero; that of
+    a rigid body is always the same."""
 
     def made() -> float:
         at = list(moving)
         M = mass_matrix(kept_integrals(body), q)[at][:, at]
         scale = 1.0 / np.sqrt(M.diagonal())
-        return float(np.linalg.eigvalsh(scale[:, None] * M * scale)[0])
+        scaled = scale[:, None] * M * scale
+        bound = 2.0 - float(np.abs(scaled).sum(axis=1).max())  # of Gershgorin's circles about one
+        return bound if bound > FAR else float(np.linalg.eigvalsh(scaled)[0])
 
     return made() if q.size else remembered(body.model, ("least of mass", body.dropped, moving), made)

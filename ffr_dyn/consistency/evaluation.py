@@ -7,6 +7,7 @@ Jacobians and null spaces are in the velocities [A^T R_dot, omega_bar, q_dot].
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from ffr_dyn.consistency.failure import failure
 from ffr_dyn.equations.inertia import kept_integrals, mass_matrix
 from ffr_dyn.equations.layout import Layout, initial_state, moved, to_body_axes, to_global_axes
 from ffr_dyn.functions.rotation import skew
+from ffr_dyn.kernels.simd.table_address import pack
 from ffr_dyn.kernels.tables import IN_Q, IN_SHARED, OK, SINGULAR_CONSTRAINT, Record, Work
 from ffr_dyn.scene.scene import Scene
 from ffr_prep.common.arrays import Array
@@ -32,6 +34,11 @@ class Evaluator(Brief):
 
     engine: Engine
     record: Record
+
+    @cached_property
+    def packed(self) -> Array:
+        """The record as compiled code finds it."""
+        return pack(self.record)
 
     @property
     def system(self) -> System:
@@ -96,7 +103,7 @@ def accelerations(at: Evaluator, time: float, x: Array, v: Array) -> Array:
 def _look(at: Evaluator, time: float, x: Array, v: Array) -> int:
     """Evaluate; a status, which is OK or that of dependent rows."""
     at.engine.x[:], at.engine.v[:] = x, v
-    status = record_row(at.engine, time, at.record, 0)
+    status = record_row(at.engine, time, at.record, 0, at.packed)
     if status not in (OK, SINGULAR_CONSTRAINT):
         raise failure(at.system, at.work, status, time)
     return int(status)
@@ -104,7 +111,8 @@ def _look(at: Evaluator, time: float, x: Array, v: Array) -> int:
 
 def locked(place: Layout) -> Array:
     """Numbers of the velocities that a planar scene does not have."""
-    return np.array([place.iv[b] + c for b in range(len(place.n)) for c in range(6) if c not in place.active(b)], int)
+    across = [{*range(6)}.difference(place.active(b)) for b in range(len(place.n))]
+    return np.array([place.iv[b] + c for b, those in enumerate(across) for c in sorted(those)], int)
 
 
 def unit_rows(numbers: Array, size: int) -> Array:

@@ -131,8 +131,8 @@ def _jump(word: Word, early: float, late: float) -> tuple[float, float]:
 def row_named(system: System, row: int) -> tuple[Block, Word]:
     """The block and word of a row of the tables."""
     starts = system.model.rows.start
-    block = system.blocks[int(np.searchsorted(starts, row, side="right")) - 1]
-    return block, block.words[row - int(starts[system.blocks.index(block)])]
+    number = int(np.searchsorted(starts, row, side="right")) - 1
+    return system.blocks[number], system.blocks[number].words[row - int(starts[number])]
 
 
 def _whole(scene: Scene, word: Word) -> float:

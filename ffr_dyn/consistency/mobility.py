@@ -114,13 +114,12 @@ def overdriven(scene: Scene, time: float = 0.0) -> tuple[str, ...]:
 
 def require_driven(scene: Scene, time: float, analysis: str) -> None:
     """Raises InputError unless the drivers fix all rigid motion, and none of them twice."""
-    over = overdriven(scene, time)
-    if over:
-        raise InputError(
-            f"over-driven: {', '.join(map(repr, over))} prescribe a motion that the joints and other drivers already fix; "
-            "remove a driver"
-        )
     found = mobility(scene, time=time)
+    if found.overdriven:
+        raise InputError(
+            f"over-driven: {', '.join(map(repr, found.overdriven))} prescribe a motion that the joints and other drivers "
+            "already fix; remove a driver"
+        )
     if (
         found.degrees_of_freedom > found.elastic
     ):  # at a singular position there are more free motions than the mechanism has

@@ -15,18 +15,24 @@ For ROS3, whose twin is of lower order and has half the step,
     v1 = min(max |R(h) - T(h/2)|, max |R(h) - E|)    too large where vibration is resolved, by its phase;
                                                      E of T(h/2) and T(r h/2) by the order of the twin
     v2 = largest difference of the amplitudes of R(h) and T(h/2)    too small where it is resolved in part
-    v = 3 sqrt(v1 v2), but within v1/2.5 and v1
+    v = 3 sqrt(v1 v2), but within v1/2.2 and v1
 
 with amplitudes of what rows are off the curve through their neighbours, over windows of 16 rows: vibration that is not
 resolved looks like noise there. It tells nothing of what vibration does to slow motion, hence the lower limit. Stiff elastic
 forces take ROS3 down to order two, and whether they do is not known of an output. With p = 2.15 the error is about right if
 they do; if they do not it is 3.4 times too large at steps four times as long. The factors were measured on the benchmark set
 (`python -m benchmarks.accuracy`).
+
+Over many rows the largest difference is an amplitude, whatever the phases. Vibration of a shock at the start that is gone
+after a row or two is seen in one phase only, by chance one in which the twin is as small as the run, or an extrapolation that
+has no order yet. There the steps to the first row and a little beyond are looked at one by one, beside a twin with half the
+step of the other, and what the run is off it is told at least.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, partial
 from typing import Any
@@ -48,8 +54,14 @@ VIBRATION = 4.5  # v over s beyond which a difference is vibration that the step
 LITTLE = 1e-3  # of the largest range of its kind: an output that moves by less counts as if it moved by this
 ARM = 1e-6  # of the largest range of forces times that of positions, the same for moments
 IN_PART = 1.5  # of what a twin with the same step is off
-MIDDLE, FLOOR, WINDOW = 3.0, 2.5, 16  # of amplitudes beside a twin with half the step
+MIDDLE, FLOOR, WINDOW = 3.0, 2.2, 16  # of amplitudes beside a twin with half the step
 TWIN = 2  # order of twins
+PLACES = re.compile(r"\.(position|R|p|angle|stroke|orientation)$")
+LOADS = re.compile(r"\.(force|moment|torque|tension|effort)$")
+OVER_BREAKS = (
+    0.5  # of methods of order three where a break lies within steps: their weights, of both signs, err by more
+)
+PARTLY_STIFF = 2.15  # order of ROS3, of an output of which it is not known whether elastic forces are stiff
 FAR, NEXT = 0.1, 2.0  # of the range, by which a step up to so many times as long makes a difference of order one
 NOISE = (70 / 36) ** 0.5  # by which rows without relation are farther off the curve than they are large
 RATES = {"position": "velocity", "R": "v", "q": "q_dot"}
@@ -60,6 +72,9 @@ SHARP = {SQRT, POWER, ASIN, ACOS}  # operations that are where their operand tur
 AT_ONCE = 2e7  # bytes of numbers that are compared side by side
 COARSE = 0.01  # of the range, by which a row may be off the curve through its neighbours
 SEED, GROWN = 1e-2, 1e2  # of rounding, from which an output has grown: it begins below the first, and is a motion above
+FIRST_ROWS = 2  # in which what a twin shows may be larger than ever after
+BEYOND = 0.25  # of a row, up to where steps are looked at after the first
+SEEN = 1e-6  # of the range, below which it is not looked for
 FULL, FEW = 0.3, 2  # of the largest, up to where a growth is even; rows in each third of its decades
 
 
@@ -160,6 +175,36 @@ def step_errors(run: Result, other: Beside | None, order: float, twins: Sequence
         shares = np.divide(errors, size, out=np.zeros(len(names)), where=size > 0)
         numbers = (column.tolist() for column in (errors, shares, off > VIBRATION * smooth))
         found |= {name: StepError(*of) for name, *of in zip(names, *numbers, strict=True)}
+    return found
+
+
+def begins_alone(run: Result, twin: Result) -> bool:
+    """Whether what a twin shows of an output is largest in the first rows, too few to tell its amplitude."""
+    scales = ranges(run)
+    for names in _batches(run, scales):
+        y, size = _columns(run, names), np.array([scales[name] for name in names])
+        early, late = y.table[: 1 + FIRST_ROWS], y.table[1 + FIRST_ROWS :]
+        other = _columns(twin, names).table
+        first = _apart(y, early, other)
+        if (first > np.maximum(_apart(y, late, other[1 + FIRST_ROWS :]), SEEN * size)).any():
+            return True
+    return False
+
+
+def with_start(errors: Mapping[str, StepError], run: Result, steps: Result, twin: Result) -> dict[str, StepError]:
+    """The errors of a run, no less than what it is off a finer twin in the steps from its first row on.
+
+    steps, twin : from the same start, with all steps of the run as rows
+    """
+    scales, found = ranges(run), dict(errors)
+    step = steps.time[1] - steps.time[0]
+    from_first = steps.time > run.time[1] - 0.5 * step
+    for names in _batches(run, errors):
+        y, other = _columns(steps, names), _columns(twin, names)
+        off = _apart(y, y.table[from_first], other.table[from_first])
+        for name, far in zip(names, off.tolist(), strict=True):
+            if far > errors[name].error:
+                found[name] = StepError(far, far / scales[name], vibrates=True)
     return found
 
 
@@ -364,3 +409,22 @@ def _grows_evenly(size: Array, seed: float, motion: float) -> bool:
 def _rate_of(name: str) -> str:
     of, _, last = name.rpartition(".")
     return f"{of}.{RATES.get(last, '')}"
+
+
+def worst(errors: Mapping[str, StepError]) -> str:
+    """Of all outputs, of positions and angles, of forces and moments."""
+    name = max(errors, key=lambda one: errors[one].of_range)
+    said = [f"step: within {of_the_range(errors[name].of_range)} of {name}"]
+    for words, kind in (("positions and angles", PLACES), ("forces and moments", LOADS)):
+        of_kind = [error.of_range for one, error in errors.items() if kind.search(one)]
+        if of_kind and not kind.search(name):
+            said.append(f"{words} within {percent(max(of_kind))}")
+    return "; ".join(said)
+
+
+def of_the_range(share: float) -> str:
+    return f"{percent(share)} of the range" if share < 1 else f"{float(f'{share:.2g}'):g} times the range"
+
+
+def percent(share: float) -> str:
+    return f"{float(f'{100 * share:.2g}'):g} %"

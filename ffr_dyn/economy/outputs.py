@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from typing import Any
@@ -98,7 +98,7 @@ def probe(assembled: Assembled, outputs: Sequence[Output], policy: Policy = DEFA
     return Probe(tuple(outputs), tuple(f[0] for f in found), tuple(f[1] for f in found), tuple(f[2] for f in found))
 
 
-def _found(everything: dict[str, Any], scene: Scene, name: str) -> tuple[str, tuple[int, ...], str]:
+def _found(everything: Mapping[str, Any], scene: Scene, name: str) -> tuple[str, tuple[int, ...], str]:
     if name in everything:
         return name, (), everything[name].unit
     head, _, label = name.rpartition(".")

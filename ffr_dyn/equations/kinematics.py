@@ -150,15 +150,15 @@ def marker_axis(scene: Scene, place: Layout, x: Array, v: Array, number: int, a0
     return axis_motion(state, a0, marker_turn(scene, state, number), b)
 
 
-def marker_direction(scene: Scene, place: Layout, x: Array, number: int, a0: Array) -> Array:
-    """Value (3,) of `marker_axis`, an axis of a marker in global axes."""
+def marker_directions(scene: Scene, place: Layout, x: Array, number: int, *axes: Array) -> list[Array]:
+    """Values (3,) of `marker_axis`, axes of a marker in global axes."""
     b, _, point = markers(scene)[number]
     if b == len(scene.bodies):
-        return a0
+        return [*axes]
     body, q = scene.bodies[b], x[place.q(b)]
     theta = body.model.interface(point).phi_r - 0.5 * (marker_matrices(body, point)[3:] @ q)
-    a: Array = rotation_matrix(from_vector(theta @ q)) @ a0
-    return rotation_matrix(x[place.p(b)]) @ a
+    turn, A = rotation_matrix(from_vector(theta @ q)), rotation_matrix(x[place.p(b)])
+    return [A @ (turn @ a0) for a0 in axes]
 
 
 def marker_turn(scene: Scene, state: BodyState, number: int) -> Turn:

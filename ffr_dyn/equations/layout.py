@@ -76,7 +76,7 @@ def initial_state(scene: Scene, place: Layout) -> tuple[Array, Array]:
 
 def angular_speeds(place: Layout, v: Array) -> Array:
     """Angular speeds (T, B) [rad/s] of all bodies, from velocities (T, V)."""
-    omega = v[:, np.add.outer(np.array(place.iv, dtype=int) + 3, np.arange(3))]
+    omega = v[:, [[first + 3, first + 4, first + 5] for first in place.iv]]
     speeds: Array = np.sqrt((omega * omega).sum(axis=2))
     return speeds
 

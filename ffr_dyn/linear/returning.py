@@ -2,11 +2,11 @@
 
 A periodic motion is a fixed point s = P(s) of the map of a period (`ffr_dyn.linear.turn_map`), which leaves open
 c(s) = P(s) - s. Anderson's mixing steps from s to s + (1 - M)^-1 c with the derivative M of P along the differences of the
-points before. Across them M is that of a cheaper map, which is known from its own search, and at the bottom zero: what
-deviates is forgotten. The maps are, from the bottom: the period in steps COARSER times as long; what this and a period of
-half these steps tell of the right ones, by the order of the method; and the period in the right steps (defect correction).
-For a linear map the mixing is GMRES on c = 0. What does not settle by itself is found by Newton's method with the monodromy
-matrix. (Walker & Ni, SIAM J. Numer. Anal. 49 (2011) 1715-1735; Stetter, Numer. Math. 29 (1978) 425-443.)
+points before; for a linear map that is GMRES on c = 0. It begins with steps COARSER times as long, whose M is zero across the
+differences: what deviates is forgotten. What a period of half these steps tells of the right ones, by the order of the
+method, corrects that. Across the differences of periods in the right steps M is the product of their derivatives
+(`ffr_dyn.linear.step_tangents`). What does not settle by itself is found by Newton's method with the monodromy matrix.
+(Walker & Ni, SIAM J. Numer. Anal. 49 (2011) 1715-1735; Stetter, Numer. Math. 29 (1978) 425-443.)
 """
 
 from __future__ import annotations
@@ -18,14 +18,17 @@ from typing import Any
 import numpy as np
 
 from ffr_dyn.kernels.tables import Record
-from ffr_dyn.linear.turn_map import DIFFERENCE, ROWS, Turns, after, deviation, mapped, monodromy, placed
+from ffr_dyn.linear.step_tangents import SAMPLES, periods_of_product, product_of_steps
+from ffr_dyn.linear.turn_map import Turns, after, deviation, mapped, monodromy, placed
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError
 
 PERIODS, KEPT = 60, 12  # of the mixing: at most, and how many are mixed
 STALLED = 0.7  # of a step over that of KEPT periods before, from where mixing gives way to Newton's method
-COARSER, FEWEST = 10, 100  # times the steps of cheap periods, and how many of these a period has at least
+COARSER, FEWEST = 40, 100  # times the steps of cheap periods, and how many of these a period has at least
 AMPLIFIED = 30.0  # of a step over what is open, of cheap maps: beyond it differences are rounding or far from linear
+RETURNING = 1e-3  # singular values of 1 - M: M is known no better
+DEAR = 1.0  # periods, that the product of the derivatives of steps may take
 # What counts as brought back, by the step to the fixed point: [rad], or relative to the scene; rates times the period.
 ROUGH, RETURNS = 1e-6, 1e-10  # of coarse steps, of the right ones
 DEFLECTS = 5e-9  # of elastic coordinates, and of their rates, relative to the largest of the body over the period
@@ -50,19 +53,11 @@ class Returned:
 
 @dataclass(frozen=True)
 class _Known:
-    """What is known of a map: points and what they leave open (2 d,), in units of the scale.
-
-    cost : of an image, in periods of the right steps;  below : of a map that is near, if there is one
-    """
+    """What is known of a map: points and what they leave open (2 d,), in units of the scale."""
 
     image_of: Callable[[Array], Array]
-    cost: float
-    below: _Known | None = None
     points: list[Array] = field(default_factory=list)
     closings: list[Array] = field(default_factory=list)
-
-    def spent(self) -> float:
-        return self.cost * len(self.points) + (self.below.spent() if self.below else 0.0)
 
     def add(self, s: Array) -> Array:
         """(2 d,) what a point leaves open, which is known from now on."""
@@ -71,8 +66,8 @@ class _Known:
         self.closings.append(closing)
         return closing
 
-    def step(self, closing: Array) -> Array:
-        """(2 d,) (1 - M)^-1 closing."""
+    def step(self, closing: Array, M: Array | None = None) -> Array:
+        """(2 d,) (1 - M)^-1 closing, with a matrix M across the differences of points or zero."""
         points, closings = (np.array(each[-KEPT:]) for each in (self.points, self.closings))
         along = np.zeros(closing.size)
         if len(points) > 1:
@@ -81,54 +76,63 @@ class _Known:
             steps, changes = steps / sizes, changes / sizes
             shares = np.linalg.lstsq(changes.T, closing, rcond=1e-8)[0]
             along, closing = shares @ steps, closing - shares @ changes
-        rest = self.below.step(closing) if self.below else closing
-        found: Array = rest - along
+        found: Array = (closing if M is None else _brought_back(M, closing)) - along
         return found
-
-    def explore(self, step: Array) -> None:
-        """Add a point beside the last, in a direction."""
-        if step.any():
-            self.add(self.points[-1] + DIFFERENCE / _largest(step) * step)
 
 
 def returned(of: Turns) -> Returned:
     """The periodic state near the chart's. Raises ComputationError where there is none."""
-    s, below = _by_cheap_maps(of)
+    s, periods = _by_coarse_steps(of)
     try:
-        return _searched(of, s, below)
+        return _searched(of, s, periods)
     except ComputationError:
         if not s.any():
             raise
-    return _searched(of, np.zeros(s.size), None)  # which coarse steps may have led away from
+    return _searched(of, np.zeros(s.size), periods)  # which coarse steps may have led away from
 
 
-def _searched(of: Turns, s: Array, below: _Known | None) -> Returned:
-    """From a state near the one that comes back, with what is known of a cheaper map."""
-    errors, scale, records = list[float](), of.scale, list[Record]()
+def at_other_steps(of: Turns, found: Returned) -> tuple[Turns, Returned]:
+    """The map with half as many steps, or twice where these are few, and what they bring back near to what its own do.
+    Raises ComputationError where they bring nothing back."""
+    other = _in_steps(of, of.steps // 2 // of.rows * of.rows or 2 * of.steps)
+    return other, _searched(other, deviation(of, found.x, found.v) / of.scale, 0.0)
+
+
+def _searched(of: Turns, s: Array, periods: float) -> Returned:
+    """From a state near the one that comes back, which has taken some periods."""
+    errors, scale, records, M = list[float](), of.scale, list[Record](), None
 
     def image(s: Array) -> Array:
         # The first period is the second of the scene, the last the first: both bring the motion back.
         later = 0.0 if records else of.period
-        records.append(after(of, *placed(of, s * scale), rows=min(ROWS, of.steps), later=later))
+        records.append(after(of, *placed(of, s * scale), rows=of.rows, later=later))
         return deviation(of, records[-1].x[-1], records[-1].v[-1]) / scale
 
-    known = _Known(image, 1.0, below)
+    known = _Known(image)
     while True:
         closing = known.add(s)
-        if below and len(known.points) == 1:
-            below.explore(known.step(closing))
-        step = known.step(closing)
+        if len(known.points) == 1 and of.rows % SAMPLES == 0 and periods_of_product(of) <= DEAR:
+            M = product_of_steps(of, records[0])
+            periods += periods_of_product(of)
+        step = known.step(closing, M)
         errors.append(max(_largest(step), _largest(closing)))
         if len(errors) > 1 and _is_back(of, step, records[-1], errors):
             break
         if _stalls(errors):
-            return _by_newton(of, known)
+            return _by_newton(of, known, periods + len(errors))
         s = s + step
     x, v = placed(of, s * scale)
-    periods, left = known.spent(), _largest(closing)
+    periods, left = periods + len(errors), _largest(closing)
     if errors[1] > REPEATS:
         periods += _check_repeats(of, x, v, s + closing, left)
     return Returned(x, v, records[-1], periods, left, newton=False)
+
+
+def _brought_back(M: Array, closing: Array) -> Array:
+    """(2 d,) (1 - M)^-1 closing; along what returns by itself, as the phase of a free spin, M counts as zero."""
+    left, sizes, right = np.linalg.svd(np.eye(closing.size) - M)
+    found: Array = right.T @ ((left.T @ closing) / np.where(sizes > RETURNING, sizes, 1.0))
+    return found
 
 
 def _largest(values: Array) -> float:
@@ -152,28 +156,24 @@ def _stalls(errors: list[float]) -> bool:
     return len(errors) >= PERIODS or (len(errors) > KEPT and errors[-1] > STALLED * errors[-1 - KEPT])
 
 
-def _by_cheap_maps(of: Turns) -> tuple[Array, _Known | None]:
-    """A state near the one that comes back, and what is known of the estimated map; the chart's state and nothing where steps
-    are too few or coarse ones bring nothing back."""
-    coarse, s, scale, errors = max(FEWEST, of.steps // COARSER), np.zeros(of.scale.size), of.scale, list[float]()
+def _by_coarse_steps(of: Turns) -> tuple[Array, float]:
+    """A state near the one that comes back, and the periods that it takes; the chart's state where steps are too few or
+    coarse ones bring nothing back."""
+    coarse, scale, errors = max(FEWEST, of.steps // COARSER), of.scale, list[float]()
+    s, part = np.zeros(scale.size), coarse / of.steps
     if 2 * coarse >= of.steps:
-        return s, None
-    part = coarse / of.steps
-    rough = _Known(lambda s: mapped(_in_steps(of, coarse), s * scale) / scale, part)
-    near = _Known(lambda s: _estimated(of, coarse, s, rough), 2 * part, rough)
+        return s, 0.0
+    rough = _Known(lambda s: mapped(_in_steps(of, coarse), s * scale) / scale)
     try:
         while not errors or errors[-1] > ROUGH:
             if _stalls(errors):
-                return np.zeros(s.size), None
-            s = s + rough.step(rough.add(s))
-            errors.append(_largest(s - rough.points[-1]))
-        s = rough.points[-1]
-        closing = near.add(s)
-        step = near.step(closing)
-        trusted = _largest(step) <= AMPLIFIED * _largest(closing)
-        return (s + step, near) if trusted else (s, None)
+                return np.zeros(s.size), len(errors) * part
+            step = rough.step(rough.add(s))
+            errors.append(_largest(step))
+            s = s + step
+        return _corrected(of, coarse, rough), (len(errors) + 2) * part
     except ComputationError:
-        return np.zeros(s.size), None
+        return np.zeros(s.size), len(errors) * part
 
 
 def _in_steps(of: Turns, steps: int) -> Turns:
@@ -182,14 +182,14 @@ def _in_steps(of: Turns, steps: int) -> Turns:
     return replace(of, steps=steps, method=replace(method, step=of.period / steps))
 
 
-def _estimated(of: Turns, coarse: int, s: Array, rough: _Known) -> Array:
-    """(2 d,) the image of a deviation by the right steps, in units of the scale: errors go as the step to the power of the
-    method's order. `rough` knows the map with coarse steps, from now on at this point too."""
-    power = of.method.order
-    image = s + (rough.closings[-1] if s is rough.points[-1] else rough.add(s))
-    half = mapped(_in_steps(of, 2 * coarse), s * of.scale) / of.scale
-    found: Array = image + (half - image) * (1 - (coarse / of.steps) ** power) / (1 - 0.5**power)
-    return found
+def _corrected(of: Turns, coarse: int, rough: _Known) -> Array:
+    """(2 d,) a state that the right steps bring back, nearly, from what is known of coarse ones: errors go as the step to the
+    power of the method's order."""
+    power, last, closing = of.method.order, rough.points[-1], rough.closings[-1]
+    half = mapped(_in_steps(of, 2 * coarse), last * of.scale) / of.scale - last
+    closing = closing + (half - closing) * (1 - (coarse / of.steps) ** power) / (1 - 0.5**power)
+    step = rough.step(closing)
+    return last + step if _largest(step) <= AMPLIFIED * _largest(closing) else last
 
 
 def _check_repeats(of: Turns, x: Array, v: Array, image: Array, error: float) -> int:
@@ -204,13 +204,13 @@ def _check_repeats(of: Turns, x: Array, v: Array, image: Array, error: float) ->
     return 1
 
 
-def _by_newton(of: Turns, known: _Known) -> Returned:
+def _by_newton(of: Turns, known: _Known, periods: float) -> Returned:
     """From the point that leaves least open."""
-    scale, periods, left = of.scale, known.spent(), np.inf
+    scale, left = of.scale, np.inf
     s = known.points[int(np.argmin([_largest(one) for one in known.closings]))]
     for _ in range(NEWTONS):
         x, v = placed(of, s * scale)
-        record = after(of, x, v, rows=min(ROWS, of.steps))
+        record = after(of, x, v, rows=of.rows)
         image = deviation(of, record.x[-1], record.v[-1]) / scale
         periods, left = periods + 1, _largest(image - s)
         if left <= RETURNS:

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from ffr_dyn.compile.engine import fill_rows, new_engine
+from ffr_dyn.compile.engine import Engine, fill_rows, new_engine
 from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.compile.workspace import new_record
 from ffr_dyn.consistency.evaluation import Evaluator, evaluate, evaluator
@@ -32,7 +32,7 @@ from ffr_dyn.scene.scene import Scene
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError, InputError
 
-ROWS = 100  # the steps of a period are as many or a multiple
+ROWS = 100  # of a period: its steps are as many, a multiple, or fewer and the rows with them
 CLOSED = 1e-13  # of constraints, relative to the scene: what is left open kicks stiff bodies at every return
 DIFFERENCE = 1e-5  # rad, or relative to the scene; of derivatives of a period, which are extrapolated
 LATER = 0.37  # s: when a driver is asked again whether it turns evenly
@@ -46,6 +46,7 @@ class Turns:
 
     across : (V, C) motions across the free ones, M^-1 jacobian^T
     sizes : (V,) what counts as a movement of one
+    rows : of the record of a period, a part of the steps
     """
 
     near: Chart
@@ -54,6 +55,7 @@ class Turns:
     method: Integrator
     period: float
     steps: int
+    rows: int
 
     @property
     def system(self) -> System:
@@ -82,7 +84,9 @@ def turns_about(of: Turns, x: Array, v: Array) -> Turns:
 def _about(at: Evaluator, time: float, x: Array, v: Array, method: Integrator, period: float, steps: int) -> Turns:
     near = chart(at, time, x, v)
     jacobian = evaluate(near.at, time, x, v).jacobian
-    return Turns(near, np.linalg.solve(near.M, jacobian.T), sizes_of(at.system), method, period, steps)
+    return Turns(
+        near, np.linalg.solve(near.M, jacobian.T), sizes_of(at.system), method, period, steps, min(ROWS, steps)
+    )
 
 
 def period_of(scene: Scene, time: float) -> float:
@@ -102,15 +106,20 @@ def period_of(scene: Scene, time: float) -> float:
 
 def after(of: Turns, x: Array, v: Array, *, rows: int = 1, later: float = 0.0) -> Record:
     """`rows` states of the period that begins at (x, v), evenly, the last at its end; or of one that begins `later` [s]."""
-    start = of.near.time + later
-    closed = gains(Projection(CLOSED * length_of(of.system)))
-    engine = new_engine(of.system, x, v, of.method, closed, start=start, spacing=of.method.step)
-    engine.work.loads.reference[:] = of.near.at.work.loads.reference
+    start, engine = of.near.time + later, engine_of(of, x, v)
     record = new_record(of.system, rows)
     status = fill_rows(engine, record, start, of.steps // rows)
     if status != OK:
         raise failure(of.system, engine.work, status, start)
     return record
+
+
+def engine_of(of: Turns, x: Array, v: Array) -> Engine:
+    """Memory for steps of the map from a state (x, v)."""
+    closed = gains(Projection(CLOSED * length_of(of.system)))
+    engine = new_engine(of.system, x, v, of.method, closed, start=of.near.time, spacing=of.method.step)
+    engine.work.loads.reference[:] = of.near.at.work.loads.reference
+    return engine
 
 
 def placed(of: Turns, s: Array) -> tuple[Array, Array]:
@@ -139,7 +148,7 @@ def _least(matrix: Array, right: Array) -> Array:
 def deviation(of: Turns, x: Array, v: Array) -> Array:
     """(2 d,) minimal coordinates of a state near the chart's. Raises ComputationError for one that is not near."""
     near, place = of.near, of.system.layout
-    y, V = _between(place, near.x, x), to_body_axes(place, x, v)
+    y, V = between(place, near.x, x), to_body_axes(place, x, v)
     if np.abs(y / of.sizes).max() > AGAIN:
         raise ComputationError(
             f"after a period of {of.period:.6g} s the scene is not where it began: the period is not that of its drivers and "
@@ -149,7 +158,7 @@ def deviation(of: Turns, x: Array, v: Array) -> Array:
     return np.concatenate([near.W.T @ y, near.W.T @ (V - near.V)])
 
 
-def _between(place: Layout, x0: Array, x: Array) -> Array:
+def between(place: Layout, x0: Array, x: Array) -> Array:
     """(V,) that moves positions x0 (X,) to x, in the body axes there."""
     y = np.zeros(place.v_size)
     for b in range(len(place.n)):
@@ -243,7 +252,7 @@ def floquet_shape(of: Turns, modes: FloquetModes, number: int, rows: int) -> Arr
             continue
         ends = [after(of, *placed(of, sign * DIFFERENCE * part * of.scale), rows=rows) for sign in (1.0, -1.0)]
         for k in range(rows):
-            forth, back = (_between(of.system.layout, rest.x[k], end.x[k]) for end in ends)
+            forth, back = (between(of.system.layout, rest.x[k], end.x[k]) for end in ends)
             shape[k] += unit * (forth - back) / (2 * DIFFERENCE)
     times = of.period / rows * np.arange(1, rows + 1)
     return shape * np.exp(-modes.exponents[number] * times)[:, None]

@@ -136,7 +136,7 @@ _KNOWN: dict[Hashable, dict[str, Entry]] = {}  # catalogues without the measurem
 _MOST, _MANY = 64, 2000  # catalogues, and entries of one that is not kept
 
 
-def catalogue(system: System) -> dict[str, Entry]:
+def catalogue(system: System) -> Mapping[str, Entry]:
     """Every quantity that can be had of a scene, by name.
 
     Scenes of one structure share their entries, which know bodies, joints and forces by number.
@@ -150,7 +150,7 @@ def catalogue(system: System) -> dict[str, Entry]:
         known = {name: entry for part in parts for name, entry in part(system)}
         if len(known) < _MANY:
             _KNOWN[key] = known
-    return {**known, **dict(_measurements(system))}
+    return {**known, **dict(_measurements(system))} if system.scene.measurements else known
 
 
 def _structure(system: System) -> Hashable:

@@ -35,9 +35,13 @@ def height_of(model: FlexibleBody, k: int, used: tuple[str, ...]) -> float:
 
     That of its centre of mass, exactly through the origin, or through a place that is used, where only a hair is missing.
     """
-    centre, near = float(model.centre_of_mass[k]), BESIDE * size_of(model)
-    places = [0.0, *(float(i.position[k]) for i in model.interfaces if i.name in used)]
-    return next((place for place in places if abs(place - centre) <= near), centre)
+
+    def found() -> float:
+        centre, near = float(model.centre_of_mass[k]), BESIDE * size_of(model)
+        places = [0.0, *(float(i.position[k]) for i in model.interfaces if i.name in used)]
+        return next((place for place in places if abs(place - centre) <= near), centre)
+
+    return remembered(model, ("height", k, used), found)
 
 
 def about_height(model: FlexibleBody, k: int, height: float) -> FlexibleBody:

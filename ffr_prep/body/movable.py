@@ -40,6 +40,8 @@ def immovable(body: FlexibleBody, active: Sequence[int] = range(6)) -> str:
     reach = math.sqrt(max(sum(body.rr_dm.diagonal().tolist()), 0.0)) or heavy
     scale = np.array([heavy if c < 3 else reach for c in rigid])
     scaled = own / np.outer(scale, scale)
+    if not body.n and (2 * scaled.diagonal() - np.abs(scaled).sum(axis=1)).min() > _NOTHING:
+        return ""  # no eigenvalue is less (Gershgorin)
     values, vectors = np.linalg.eigh(scaled)
     if values[0] <= _NOTHING:
         turning = np.array(rigid) >= 3  # what has a mass, and no inertia, turns about a line

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ffr_prep.body.reduced import FlexibleBody
+from ffr_prep.body.reduced import FlexibleBody, remembered
 
 _LONG = 100.0  # m
 _HEAVIEST = 2.3e4  # kg/m^3, of osmium
@@ -23,7 +23,7 @@ def units_doubts(body: FlexibleBody) -> list[str]:
 
     >>> fp.units_doubts(body)
     """
-    return [*_of_shape(body), *_of_points(body)]
+    return [*remembered(body, "units doubts", lambda: (*_of_shape(body), *_of_points(body)))]
 
 
 def _of_shape(body: FlexibleBody) -> Iterator[str]:

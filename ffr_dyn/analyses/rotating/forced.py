@@ -172,7 +172,7 @@ def _wave(
     assembled = assemble(excited(scene, acts, harmonic(amplitude=amplitude, frequency=MARK, phase=phase)))
     period = 1 / MARK
     of = turns(assembled.system, 0.0, assembled.x, assembled.v, ROS3(period / steps), period)
-    of = replace(of, steps=-(-steps // ROWS) * ROWS)
+    of = replace(of, steps=-(-steps // ROWS) * ROWS, rows=ROWS)
     return wave(of, amplitude, power, float(np.sqrt(band[0] * band[1]))), assembled.notes
 
 

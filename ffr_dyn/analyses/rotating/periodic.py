@@ -13,16 +13,18 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ffr_dyn.analyses.integration import with_all_reactions
-from ffr_dyn.analyses.outcome import result_of
+from ffr_dyn.analyses.outcome import result_of, with_quantities
 from ffr_dyn.analyses.registry import OfMoment, option
 from ffr_dyn.analyses.settings import MomentSettings
 from ffr_dyn.consistency.assemble import Assembled, assemble
 from ffr_dyn.consistency.doubts import checked
 from ffr_dyn.consistency.evaluation import evaluator, joined, record_states
+from ffr_dyn.consistency.step_error import OVER_BREAKS, PARTLY_STIFF, Beside, step_errors, untold_breaks, worst
 from ffr_dyn.consistency.tangent import sizes_of
 from ffr_dyn.equations.layout import moved
 from ffr_dyn.integrators import ROS3, Integrator
-from ffr_dyn.linear.returning import Returned, returned
+from ffr_dyn.kernels.tables import Record
+from ffr_dyn.linear.returning import Returned, at_other_steps, returned
 from ffr_dyn.linear.turn_map import Turns, floquet_modes, floquet_shape, period_of, turns, turns_about
 from ffr_dyn.linear.words import in_words
 from ffr_dyn.results.quantities import selected
@@ -30,11 +32,13 @@ from ffr_dyn.results.result import Result
 from ffr_dyn.scene.described import described
 from ffr_dyn.scene.scene import Scene, require_scene
 from ffr_prep.common.arrays import Array
-from ffr_prep.common.errors import InputError
+from ffr_prep.common.errors import ComputationError, InputError
 
-STEPS = 1000  # to a period, where no method is given
-GONE = 1e-6  # of a multiplier: below it differences of a period tell nothing of the shape
+STEPS = 4000  # to a period, where no method is given
+FAR = 0.5  # of a multiplier, that other steps change it by: beyond it the change is told
+GONE = 1e-4  # of a multiplier: below it differences of a period tell nothing of the shape
 SHOWN = 12  # modes that a command prints
+UNKNOWN = "the error of the steps is not known: others bring nothing back; give smaller ones (step, --step)"
 CYCLES = 10  # periods that a film of one shows, at most
 
 
@@ -47,9 +51,14 @@ class Periodic(OfMoment):
 
     example: ClassVar[str] = "ffr-dyn periodic engine.toml --floquet -o out/turn.nc"
     period: float = field(default=0.0, metadata=option("--period", "[s]; default: a turn of the driver."))
-    step: float = field(default=0.0, metadata=option("--step", "[s] of ros3; default: a thousandth of the period."))
+    step: float = field(
+        default=0.0, metadata=option("--step", "[s] of ros3; default: a four-thousandth of the period.")
+    )
     floquet: bool = field(
         default=False, metadata=option("--floquet/--no-floquet", "Also Floquet's multipliers: takes many periods.")
+    )
+    check: bool = field(
+        default=True, metadata=option("--check/--no-check", "Tell the error that the length of the steps makes.")
     )
     film: str = field(
         default="", metadata=option("--film", "Film of a Floquet mode, .html, .gif or .mp4.", metavar="FILE")
@@ -66,7 +75,9 @@ class Periodic(OfMoment):
 
             motion = floquet_motion(scene, self.mode - 1, period=period, method=method, time=settings.time)
             animate(motion, self.film)
-        return periodic(scene, period=period, method=method, floquet=self.floquet, **settings.span, **how)
+        return periodic(
+            scene, period=period, method=method, floquet=self.floquet, check=self.check, **settings.span, **how
+        )
 
     def report(self, result: Result) -> list[str]:
         a = result.attributes
@@ -80,6 +91,7 @@ def periodic(
     period: float | None = None,
     method: Integrator | None = None,
     floquet: bool = False,
+    check: bool = True,
     time: float = 0.0,
     outputs: Sequence[str] = ("default",),
     path: str | Path | None = None,
@@ -87,14 +99,16 @@ def periodic(
     """A period of the motion that repeats itself, from `time` [s] on, in a hundred rows and one.
 
     period  : [s]; by default a turn of the driver that turns evenly
-    method  : with its step, which is shortened to a part of the period; by default ROS3 with a thousandth of it
+    method  : with its step, which is shortened to a part of the period; by default ROS3 with a four-thousandth of it
     floquet : also Floquet's multipliers, at the cost of four periods for every state variable
+    check   : also find it with steps twice as long, which tells the error of every output, for about one period more
     outputs : names or patterns of the quantities to keep, as in `forward`
 
-    The attributes have the `period`, `periods` (how many were computed, one of a tenth of the steps counting as a tenth) and
+    The attributes have the `period`, the `step`, `periods` (how many were computed, with fewer steps as parts of one) and
     `returns` (by how much the end is off the beginning, relative). With floquet there are also `multipliers` (pairs of real
     and imaginary parts, the largest first) and `exponents` (growth [1/s] and circular frequency [rad/s] of each). Then
-    `leading` has what moves in each, as of `linearise`, and `stable` whether none grows.
+    `leading` has what moves in each, as of `linearise`, and `stable` whether none grows. With check, "errors" has [error in
+    its unit, error over range] of every output, "accuracy" the worst in words, and "multiplier_errors" those of multipliers.
 
         turn = fd.periodic(engine)
         turn["main_bearing.force"]
@@ -107,22 +121,58 @@ def periodic(
     assembled = assemble(scene, time=time)
     selected(assembled.system, outputs)
     of, found = _found(assembled, time, method, period)
-    first = record_states(of.near.at, np.array([time]), found.x[None], found.v[None])
-    record = with_all_reactions(assembled, joined([first, found.record]))
+    record = _record(assembled, of, found)
+    result = result_of(assembled.system, record, {}, None, outputs)
+    told = _errors(assembled, (of, found), result, outputs, floquet) if check else {}
     attributes = {
         **described(scene),
         "analysis": "periodic motion",
         "method": f"{'Newton' if found.newton else 'Anderson'}'s method on turns of {type(of.method).__name__}, step "
         f"{of.method.step:.6g} s, {found.periods:.3g} periods",
         "period": of.period,
+        "step": of.method.step,
         "periods": found.periods,
         "returns": found.error,
         "degrees_of_freedom": assembled.degrees_of_freedom,
-        **(_multipliers(of, found.x, found.v) if floquet else {}),
-        "notes": [*assembled.notes, *checked("static", assembled, record)],
+        **(_multipliers(of, found) if floquet else {}),
+        **told,
+        "notes": [*assembled.notes, *checked("static", assembled, record), *([UNKNOWN] if check and not told else [])],
         "status": "complete",
     }
-    return result_of(assembled.system, record, attributes, path, outputs)
+    return with_quantities(replace(result, attributes=attributes), {}, path)
+
+
+def _errors(
+    assembled: Assembled, turn: tuple[Turns, Returned], result: Result, outputs: Sequence[str], floquet: bool
+) -> dict[str, Any]:
+    """The attributes that tell the error of the steps; none where other steps bring nothing back."""
+    (of, found), system = turn, assembled.system
+    try:
+        other, again = at_other_steps(of, found)
+    except ComputationError:
+        return {}
+    ratio, order = of.steps / other.steps, PARTLY_STIFF if isinstance(of.method, ROS3) else of.method.order
+    if untold_breaks(system, result.time):
+        order = OVER_BREAKS if isinstance(of.method, ROS3) else 1
+    beside = Beside(result_of(system, _record(assembled, of, again), {}, None, outputs), ratio)
+    errors = step_errors(result, beside, order)
+    attributes: dict[str, Any] = {
+        "errors": {name: [e.error, e.of_range] for name, e in errors.items()},
+        "accuracy": worst(errors),
+        "periods": found.periods + again.periods / ratio,
+    }
+    if floquet:
+        one, two = (floquet_modes(turns_about(of, t.x, t.v)).multipliers for of, t in (turn, (other, again)))
+        apart = np.abs(one[:, None] - two).min(axis=1, initial=np.inf)
+        far = apart > FAR * np.abs(one)  # steps that damp a mode to nothing have no order yet
+        attributes["multiplier_errors"] = np.where(far, apart, apart / abs(ratio**order - 1)).tolist()
+    return attributes
+
+
+def _record(assembled: Assembled, of: Turns, found: Returned) -> Record:
+    """The rows of the period, with that at its beginning."""
+    first = record_states(of.near.at, np.array([of.near.time]), found.x[None], found.v[None])
+    return with_all_reactions(assembled, joined([first, found.record]))
 
 
 def floquet_motion(
@@ -186,12 +236,12 @@ def _found(
     return of, returned(of)
 
 
-def _multipliers(of: Turns, x: Array, v: Array) -> dict[str, Any]:
+def _multipliers(of: Turns, turn: Returned) -> dict[str, Any]:
     """Floquet's multipliers about a periodic state, the largest first, with their exponents and what moves."""
-    again = turns_about(of, x, v)
+    again = turns_about(of, turn.x, turn.v)
     found = floquet_modes(again)
     scene, place = of.system.scene, of.system.layout
-    names = in_words(scene, place, x, again.near.M, found.shapes, found.rates, [""] * found.multipliers.size)
+    names = in_words(scene, place, turn.x, again.near.M, found.shapes, found.rates, [""] * found.multipliers.size)
     told = zip(names, np.abs(found.multipliers) > GONE, strict=True)
     return {
         "multipliers": _pairs(found.multipliers),
@@ -208,10 +258,12 @@ def _pairs(values: Array) -> list[list[float]]:
 def floquet_lines(attributes: Mapping[str, Any]) -> list[str]:
     """A line for each of the first dozen Floquet modes, one of each conjugate pair."""
     lines = []
-    both = zip(attributes["multipliers"], attributes["exponents"], attributes["leading"], strict=True)
-    for (re, im), (growth, rate), name in both:
+    errors = attributes.get("multiplier_errors")
+    offs = [f", within {error:.2g}" for error in errors] if errors else [""] * len(attributes["multipliers"])
+    both = zip(attributes["multipliers"], attributes["exponents"], offs, attributes["leading"], strict=True)
+    for (re, im), (growth, rate), off, name in both:
         if rate >= 0:
             frequency = f"{rate / (2 * np.pi):12.6g} Hz   growth {growth:11.4g} 1/s   "
-            lines.append(f"{frequency}multiplier {re:.6g} {im:+.6g}i   {name}")
+            lines.append(f"{frequency}multiplier {re:.6g} {im:+.6g}i{off}   {name}")
     more = [f"... and {len(lines) - SHOWN} more in the file"] if len(lines) > SHOWN else []
     return lines[:SHOWN] + more

@@ -112,7 +112,7 @@ def address_of(array: Array) -> int:
 def pack(tables: Any, addresses: Sequence[int] = (), but: str = "") -> Array:
     """Addresses and shapes of the arrays of nested named tuples, and their numbers (int64). The arrays must outlive it.
 
-    addresses : of all arrays, where they are known
+    addresses : of all arrays, which are contiguous, where they are known
     but       : a field that is an empty tuple, of which the words are left open
     """
     kind: Any = type(tables)
@@ -120,7 +120,7 @@ def pack(tables: Any, addresses: Sequence[int] = (), but: str = "") -> Array:
     _gather(tables, arrays, integers, numbers)
     if [of.dtype for of in arrays] != plan.dtypes or [of.ndim for of in arrays] != plan.axes:
         raise TypeError(f"{kind.__name__} holds an array of another type, or of other axes, than it declares")
-    if not all(of.flags.c_contiguous for of in arrays):
+    if not addresses and not all(of.flags.c_contiguous for of in arrays):
         raise TypeError(f"{kind.__name__} holds an array that is not contiguous")
     words = np.zeros(plan.words, dtype=np.int64)
     words[plan.addresses] = addresses or [address_of(of) for of in arrays]

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from synthetic import cloud
 
-from ffr_dyn.analyses.forward import _of_the_range, forward
+from ffr_dyn.analyses.forward import forward
 from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.analyses.registry import summary
-from ffr_dyn.consistency.step_error import largest_difference, ranges
+from ffr_dyn.consistency.step_error import largest_difference, of_the_range, ranges
 from ffr_dyn.functions.formula import formula
 from ffr_dyn.integrators import RK4, ROS2, ROS3, AdaptiveROS3, Within, stepped, tolerances
 from ffr_dyn.integrators.stabilisation import Projection
@@ -83,8 +83,8 @@ def test_an_error_beyond_the_range_is_told_in_ranges():
     """Not in thousands of per cent, and without advice that has been followed."""
     found = forward(swinging(0.0, stiffer=100.0), **SPAN, method=ROS2(1e-3), begin="quasi-static")
     assert not any('begin = "quasi-static"' in note for note in found.attributes["notes"])
-    assert _of_the_range(0.015) == "1.5 % of the range"
-    assert _of_the_range(412.3) == "410 times the range"
+    assert of_the_range(0.015) == "1.5 % of the range"
+    assert of_the_range(412.3) == "410 times the range"
 
 
 def test_without_a_step_the_accuracy_is_kept(truth):

@@ -19,6 +19,7 @@ from test_turned_stiffening import FIXED
 
 import ffr_dyn as fd
 from ffr_dyn.analyses.checkpoint import fingerprint
+from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.closing import constraints
 from ffr_dyn.closing.constraints import constraints_of, rows_at
 from ffr_dyn.compile import elimination, row_tables, workspace
@@ -286,6 +287,19 @@ def test_a_body_that_is_used_by_none_is_gone():
     del link
     gc.collect()
     assert gone() is None
+
+
+def test_a_scene_without_functions_is_gone_at_once():
+    """Nothing of it refers to itself: its memory does not wait for the garbage collector."""
+    gc.disable()
+    try:
+        scene = slider_crank()
+        gone = weakref.ref(scene), weakref.ref(assemble(scene).system)
+        integrate(scene, end=2e-3, output_step=1e-3, method=fd.ROS2(1e-4))
+        del scene
+        assert [ref() for ref in gone] == [None, None]
+    finally:
+        gc.enable()
 
 
 # ---- results of which the rows are kept ------------------------------------------------------------------------------

@@ -94,7 +94,7 @@ def test_modes_about_the_turn_of_an_engine_are_those_of_its_rod():
     np.testing.assert_allclose(np.exp([complex(*pair) * a["period"] for pair in a["exponents"]]),
                                [complex(*pair) for pair in a["multipliers"]], rtol=1e-6)  # fmt: skip
     lasting = [name for name in a["leading"] if name != "gone after a period"]
-    assert len(lasting) == np.sum(np.abs([complex(*pair) for pair in a["multipliers"]]) > 1e-6) >= 2
+    assert len(lasting) == np.sum(np.abs([complex(*pair) for pair in a["multipliers"]]) > 1e-4) >= 2
     assert all(name.startswith("rod: ") for name in lasting)
 
 
@@ -106,21 +106,53 @@ def test_deflections_come_back_to_a_hundred_millionth_of_themselves(damping, tur
     scene = replace(scene, bodies=bodies)
     found = fd.periodic(scene)
     period = found.attributes["period"]
-    how = {"output_step": period / 100, "method": fd.ROS3(period / 1000), "check": False}
+    how = {"output_step": period / 100, "method": fd.ROS3(found.attributes["step"]), "check": False}
     run = fd.forward(scene, end=turns * period, stabilisation=fd.Projection(1e-14), **how)
     np.testing.assert_allclose(run["rod.q"][-101:], found["rod.q"], rtol=0, atol=1e-8 * np.abs(found["rod.q"]).max())
 
 
 def test_a_driven_machine_ends_where_a_long_run_does():
     scene = flexible_crank(loads=())
-    found = fd.periodic(scene)
+    found = fd.periodic(scene, check=False)
     assert found.attributes["returns"] < 1e-10
     assert found.attributes["periods"] <= 4
-    step, period = found.attributes["period"] / 1000, found.attributes["period"]
-    how = {"output_step": period / 100, "method": fd.ROS3(step), "stabilisation": fd.Projection(1e-12), "check": False}
+    step, period = found.attributes["step"], found.attributes["period"]
+    how = {"output_step": period / 100, "method": fd.ROS3(step), "stabilisation": fd.Projection(1e-14), "check": False}
     again = fd.forward(scene, end=period, begin="periodic", **how)
     np.testing.assert_allclose(again["rod.q"], found["rod.q"], atol=1e-8 * np.abs(found["rod.q"]).max())
     np.testing.assert_allclose(again["rod.q"][-1], again["rod.q"][0], atol=1e-7 * np.abs(found["rod.q"]).max())
+
+
+@pytest.mark.parametrize("case", [lambda: flexible_crank(loads=()), lambda: four_bar(20.0), lambda: four_bar(60.0)])
+def test_the_error_of_the_steps_is_told_of_every_output(case):
+    """Beside steps eight times as short: neither less than the true one nor ten times as large."""
+    scene = case()
+    period = fd.periodic(scene, check=False).attributes["period"]
+    found = fd.periodic(scene, method=fd.ROS3(period / 500))
+    truth = fd.periodic(scene, method=fd.ROS3(period / 4000), check=False)
+    ratios = []
+    for name, (told, share) in found.attributes["errors"].items():
+        true = np.abs(found[name] - truth[name]).max()
+        if told > 0 and share * true / told > 1e-6:
+            ratios.append(told / true)
+    assert len(ratios) > 3
+    assert 0.9 < min(ratios) < max(ratios) < 10
+    worst = max(share for _, share in found.attributes["errors"].values())
+    assert found.attributes["accuracy"].startswith(f"step: within {float(f'{100 * worst:.2g}'):g} % of the range of ")
+
+
+def test_the_error_of_multipliers_is_told():
+    """Steps that are too long damp the vibration of the rod."""
+    scene = flexible_crank(loads=())
+    period = fd.periodic(scene, check=False).attributes["period"]
+    truth, *runs = (
+        fd.periodic(scene, method=fd.ROS3(period / n), floquet=True, check=n < 8000).attributes
+        for n in (8000, 1000, 2000)
+    )
+    for run in runs:
+        true = abs(complex(*truth["multipliers"][0]) - complex(*run["multipliers"][0]))
+        assert 0.25 * true < run["multiplier_errors"][0] < 5 * true
+    assert f", within {runs[-1]['multiplier_errors'][0]:.2g}   rod: " in floquet_lines(runs[-1])[0]
 
 
 @pytest.mark.parametrize("steps", [37, 460, 1037])
@@ -233,6 +265,6 @@ def test_a_four_bar_whose_vibrations_coarse_steps_do_not_follow(speed):
     found = fd.periodic(scene)
     period, size = found.attributes["period"], np.abs(found["coupler.q"]).max()
     np.testing.assert_allclose(found["coupler.q"][-1], found["coupler.q"][0], rtol=0, atol=1e-7 * size)
-    how = {"output_step": period / 100, "method": fd.ROS3(period / 1000), "check": False}
+    how = {"output_step": period / 100, "method": fd.ROS3(found.attributes["step"]), "check": False}
     run = fd.forward(scene, end=3 * period, begin="periodic", stabilisation=fd.Projection(1e-14), **how)
     np.testing.assert_allclose(run["coupler.q"][-101:], found["coupler.q"], rtol=0, atol=1e-8 * size)
