@@ -26,6 +26,7 @@ from ffr_dyn.equations.inertia import kept_integrals, mass_matrix
 from ffr_dyn.functions.rotation import rotation_matrix
 from ffr_dyn.integrators import Integrator
 from ffr_dyn.integrators.stabilisation import excess_of_gains
+from ffr_dyn.integrators.tolerances import tightened
 from ffr_dyn.kernels.tables import NOT_FINITE, OK, Record
 from ffr_dyn.results.power import power
 from ffr_dyn.results.recorded_motion import View
@@ -225,7 +226,7 @@ def _powers(view: View) -> Array:
 def _finer(method: Integrator, step: float) -> Any:
     kept: Any = method
     if method.controlled:
-        return replace(kept, tolerances=replace(kept.tolerances, relative=kept.tolerances.relative / 100))
+        return replace(kept, tolerances=tightened(kept.tolerances, 100))
     return replace(kept, step=step)
 
 

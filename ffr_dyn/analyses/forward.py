@@ -24,18 +24,20 @@ from ffr_dyn.analyses.settings import Settings
 from ffr_dyn.consistency.assemble import Assembled, assemble
 from ffr_dyn.consistency.quasi_static import quasi_static
 from ffr_dyn.consistency.step_error import (
+    A_FORMULA,
     BEYOND,
+    OVER_BREAKS,
     PARTLY_STIFF,
     PLACES,
     Beside,
     StepError,
     begins_alone,
     from_rounding,
-    jumps,
     of_the_range,
     percent,
     step_errors,
     too_coarse,
+    untold_breaks,
     with_start,
     worst,
 )
@@ -45,6 +47,7 @@ from ffr_dyn.functions.together import Say, together
 from ffr_dyn.integrators import Integrator, Within, stepped
 from ffr_dyn.integrators.ros2 import Twin
 from ffr_dyn.integrators.stabilisation import Projection, Stabilisation
+from ffr_dyn.integrators.tolerances import tightened
 from ffr_dyn.linear.steady_state import steadily
 from ffr_dyn.results.file import load_result, with_attributes
 from ffr_dyn.results.result import Result
@@ -60,6 +63,7 @@ PROJECTED = (
 SURE = 2  # order that linearly implicit methods keep where elastic forces are stiff
 SLOW = 0.7  # a ringing output's error falls slower than the step to this power,
 IN_COMPANY = 1.4  # or to this one, if it is of vibration, where others ring
+SHOWN = 3  # times in a note
 QUICK = 1e7  # microseconds of the further runs, by `_cost`, up to which they are made unasked
 
 Beginning = Literal["as-given", "quasi-static", "steady", "periodic"]  # the default and the others
@@ -124,10 +128,10 @@ class _Runs:
         return vibrations(self.assembled, self.start)
 
     @cached_property
-    def jumps(self) -> bool:
-        """Whether a force jumps at a time."""
-        system = self.assembled.system
-        return jumps(system.scene, system.model.functions, self.start, self.how["end"])
+    def untold(self) -> dict[str, list[float]]:
+        """When [s] functions of time break without steps that end there, by what they are for."""
+        count = round((self.how["end"] - self.start) / self.output_step)
+        return untold_breaks(self.assembled.system, np.linspace(self.start, self.how["end"], count + 1))
 
     def run(self, method: Integrator, **more: Any) -> Result:
         """One run."""
@@ -308,7 +312,9 @@ def _told(runs: _Runs, trial: _Trial, other: Any, *longer: Any) -> _Trial:
         return replace(trial, errors={})
     share, failed = _share(trial.method), any(isinstance(twin, ComputationError) for twin in longer)
     too_long = failed or (share is not None and not trial.twins)  # steps for an order, where twins fail
-    order = 1 if runs.jumps or too_long else PARTLY_STIFF if share == 0.5 else trial.method.order
+    order = 1 if too_long else PARTLY_STIFF if share == 0.5 else trial.method.order
+    if runs.untold:
+        order = OVER_BREAKS if trial.method.order == 3 else 1
     twins = (*trial.twins, *(twin for twin in longer if not _failed(twin)))
     errors = step_errors(trial.result, other, order, twins)
     start = _start(runs, trial.method, trial.result, trial.twins[0]) if trial.twins else ()
@@ -320,7 +326,8 @@ def _further(
 ) -> list[Callable[[Say], Beside | None]]:
     """The further runs that tell the error of a run beside its twin: one with another step, and, beside a twin of half the
     step, one with a longer step; those of the last trial if its step is not too far."""
-    near = next((one for one in reversed(earlier) if one.twins and count <= _leap(method) * one.count), None)
+    far = 2 if runs.untold else _leap(method)
+    near = next((one for one in reversed(earlier) if one.twins and count <= far * one.count), None)
     if near is not None:
         ratio = count / near.count
         known = [Beside(near.result, ratio), *(Beside(one.result, ratio * one.ratio) for one in near.twins[:1])]
@@ -330,14 +337,14 @@ def _further(
 
 
 def _other(runs: _Runs, method: Any, count: int, say: Say) -> Beside:
-    """The run with another step: about twice the step, or four times of a method of higher order, where elastic forces are
-    implicit and that is part of a row, else half of it; with a tenth of the tolerance of a method that chooses its steps, and
-    work added up twice as often."""
+    """The run with another step: about twice the step, or four times of a method of higher order unless a break lies within
+    steps, where elastic forces are implicit and that is part of a row, else half of it; with a tenth of the tolerances of a
+    method that chooses its steps, and work added up twice as often."""
     if method.controlled:
-        closer = replace(method, tolerances=replace(method.tolerances, relative=method.tolerances.relative / 10))
-        return Beside(runs.run(closer, progress=say, looks=2 * LOOKS), 10.0 ** (-1.0 / method.order))
+        finer = replace(method, tolerances=tightened(method.tolerances, 10))
+        return Beside(runs.run(finer, progress=say, looks=2 * LOOKS), 10.0 ** (-1.0 / method.order))
     if method.implicit and count > 1:
-        fewer = -(-count // (4 if method.order > SURE else 2))
+        fewer = -(-count // (4 if method.order > SURE and not runs.untold else 2))
         try:
             return Beside(runs.run(replace(method, step=runs.output_step / fewer), progress=say), count / fewer)
         except ComputationError:
@@ -391,6 +398,7 @@ def _finished(runs: _Runs, trial: _Trial, path: str | Path | None, ringing: Set[
     notes = [
         *result.attributes["notes"],
         *unseen,
+        *(_untold(runs) if trial.errors else ()),
         *_unresolved(runs, trial, ringing),
         *_coarse(result),
         *_unstable(result, grown),
@@ -420,6 +428,21 @@ def _unseen(trial: _Trial) -> list[str]:
     return [
         "the error told leaves out vibration that the steps damp: the run that shows it has failed; take a smaller step"
     ]
+
+
+def _untold(runs: _Runs) -> list[str]:
+    """Notes on breaks at which no steps end."""
+    return [
+        f"{what} jumps or has a kink at t = {', '.join(f'{t:.6g}' for t in times[:SHOWN])}"
+        f"{', ...' * (len(times) > SHOWN)} s, where no step ends, and steps are of first order there; {_way_to_tell(what)}"
+        for what, times in runs.untold.items()
+    ]
+
+
+def _way_to_tell(what: str) -> str:
+    if what == A_FORMULA:
+        return "write it with abs, min, max or step, at whose kinks they end"
+    return "give its times, as in fd.user(function, breaks=[0.5])"
 
 
 def _unresolved(runs: _Runs, trial: _Trial, ringing: Set[str]) -> list[str]:

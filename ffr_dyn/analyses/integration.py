@@ -246,9 +246,9 @@ def _started(assembled: Assembled, engine: Engine, energy: EnergyWatch, seen: Se
     if status != OK:
         raise failing.failure(engine.system, engine.work, status, start)
     first = with_all_reactions(assembled, first)
-    if engine.work.independence[HERE] < AT:
-        first = with_limits(assembled.system, assembled.all_rows, first)
-    kept.add(View(assembled.system, first), np.zeros(1, dtype=np.int64))
+    singular = engine.work.independence[HERE] < AT
+    shown = with_limits(assembled.system, assembled.all_rows, first) if singular else first
+    kept.add(View(assembled.system, shown), np.zeros(1, dtype=np.int64))
     run = _Run(engine, energy, kept, seen, 0)
     if isinstance(kept, Measured):
         _look(run, first)  # a file holds what has been seen of its rows

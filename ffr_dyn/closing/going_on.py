@@ -61,7 +61,7 @@ def going_on(constraints: Constraints, x: Array, v: Array) -> Array:
     if not np.abs(left).max(initial=0.0) > allowed:
         return v
     cone = _cone(constraints, x, to_body_axes(place, x, v))
-    for start in _starts(cone):
+    for start in _starts(cone) if cone.combinations.size else ():
         found = least_squares(cone.contradiction, start, jac="3-point", xtol=1e-15, ftol=1e-15, gtol=1e-15)
         if np.abs(found.fun).max() <= allowed:
             return to_global_axes(place, x, cone.at(found.x))

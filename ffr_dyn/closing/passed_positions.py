@@ -39,7 +39,7 @@ def passed_in_words(system: System, all_rows: System | None, work: Work, step: f
     what = "a singular position" if len(apart) == 1 else "singular positions"
     return [
         f"the motion passes {what} near t = {', '.join(f'{time:.6g}' for time in apart)} s{more}, where constraints become "
-        "dependent; it goes on along its branch; rows there are limits from both sides, and what grows without bound is nan"
+        "dependent; it goes on along its branch; rows there are limits of the motion, and what has none, or rests, is nan"
     ]
 
 

@@ -12,6 +12,7 @@ from ffr_dyn.compile.first_use import ensure_compiled
 from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.compile.stiff_rows import with_stiff_rows
 from ffr_dyn.compile.workspace import new_tables
+from ffr_dyn.functions.time_functions import OPERATION, PIECEWISE, USER
 from ffr_dyn.kernels.entry_points import evaluate_exact, evaluate_loads, record_state, run, run_controlled, step
 from ffr_dyn.kernels.simd.force_kernel import kernel_of
 from ffr_dyn.kernels.simd.table_address import address_of, pack, place_of
@@ -23,6 +24,8 @@ if TYPE_CHECKING:
     from ffr_dyn.integrators import Controlled, Integrator
 
 LEAST_STEP = 1e-9  # of a controlled method, relative to the spacing of its rows
+# The same, where functions of time may rest and begin again: a longer step may see nothing of a pulse.
+LONGEST_STEP, SHAPED = 10.0, {PIECEWISE, USER, OPERATION}
 
 
 @dataclass(frozen=True, repr=False)
@@ -80,7 +83,7 @@ def new_engine(
     if method is not None:
         tables.entry_points[step.number] = method.do_step.address
         tables.stages.numbers[:] = method.numbers
-        tables.clock.time[:] = method.step, method.step or spacing
+        tables.clock.time[: SPACING + 1] = method.step, method.step or spacing
         if method.controlled:
             _set_control(tables.control, system, cast("Controlled", method), start, spacing)
     tables.clock.gains[:] = gains
@@ -95,8 +98,9 @@ def _set_control(control: Control, system: System, method: Controlled, start: fl
         # Elastic coordinates are displacements times the square root of a mass; their rates count over one step.
         elastic = wanted.elastic * np.sqrt(body.model.mass)
         control.weight_x[place.q(b)], control.weight_v[place.q_dot(b)] = elastic, -elastic
-    least = LEAST_STEP * spacing
-    control.numbers[:] = 0.01 * spacing, start, start, 1.0, wanted.relative, method.estimate_order, least
+    least, kinds = LEAST_STEP * spacing, set(system.model.functions.kind.tolist())
+    longest = LONGEST_STEP * spacing if kinds & SHAPED else np.inf
+    control.numbers[:] = 0.01 * spacing, start, start, 1.0, wanted.relative, method.estimate_order, least, longest
 
 
 def _engine(system: System, tables: Tables, words: Array) -> Engine:

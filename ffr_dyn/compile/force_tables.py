@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ffr_dyn.functions.breaks import declared_breaks, switches
 from ffr_dyn.functions.curves import Curve, pieces
 from ffr_dyn.functions.time_functions import OPERATION, USER, TimeFunction, as_time_function, is_zero
 from ffr_dyn.kernels.tables import WAYS, Functions, Loads
@@ -52,7 +53,7 @@ class FunctionTable:
     def add(self, function: TimeFunction, what: str = "function") -> int:
         if function.callback is not None:
             slot = self.callback(function.callback, (1, 2, 3), what, with_state=False)
-            function = TimeFunction(USER, (float(slot),))
+            function = TimeFunction(USER, (float(slot), *function.data[1:]))
         elif function.kind == OPERATION:
             rows = [float(self.add(operand, what)) for operand in function.operands]
             function = TimeFunction(OPERATION, (*function.data, rows[0], rows[-1]))
@@ -86,6 +87,8 @@ class FunctionTable:
             kind=np.array([f.kind for f in self.functions], dtype=np.int64),
             start=np.concatenate([[0], np.cumsum(sizes, dtype=np.int64)]).astype(np.int64),
             data=np.array([number for f in self.functions for number in f.data], dtype=float),
+            breaks=declared_breaks(self.functions),
+            switches=switches(self.functions),
         )
 
 

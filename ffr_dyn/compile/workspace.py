@@ -81,7 +81,7 @@ def new_tables(system: System, method: Integrator | None, keeps_passed: bool) ->
 
 def _blank(system: System, needs: _Needs) -> Tables:
     X, V = system.layout.x_size, system.layout.v_size
-    chosen = {"numbers": 7, "weight_x": X, "weight_v": V, "x": X, "v": V, "held_x": X, "held_v": V}
+    chosen = {"numbers": 8, "weight_x": X, "weight_v": V, "x": X, "v": V, "held_x": X, "held_v": V}
     return Tables(
         address=0,
         entry_points=np.zeros(len(system.chosen), dtype=np.int64),
@@ -89,7 +89,9 @@ def _blank(system: System, needs: _Needs) -> Tables:
         model=(),  # type: ignore[arg-type]  # each scene has its own
         work=_blank_work(system.model, needs.keeps_terms, needs.keeps_passed),
         stages=_stages(system, needs),
-        clock=Clock(np.zeros(2), np.zeros(3, dtype=np.int64), np.zeros(3)),
+        clock=Clock(
+            np.array([0.0, 0.0, -np.inf, np.inf]), np.full(3, np.inf), np.zeros(3, dtype=np.int64), np.zeros(3)
+        ),
         control=Control(
             counts=np.zeros(2, dtype=np.int64),
             **_zeros(**{key: size * needs.controlled for key, size in chosen.items()}),
@@ -135,6 +137,7 @@ def _fill(work: Work, m: Model) -> None:
 
 def _blank_work(m: Model, keeps_terms: bool, keeps_passed: bool) -> Work:
     V, n = 6 * m.bodies.mass.size + int(m.bodies.where[-1, IN_Q]), m.bodies.where[:, N]
+    F = m.functions.kind.size
     bodies = _body_work(m, keeps_terms)
     return Work(
         bodies=bodies,
@@ -146,7 +149,7 @@ def _blank_work(m: Model, keeps_terms: bool, keeps_passed: bool) -> Work:
         implicit=np.array([0.0, 0.0, 0.0, 1.0, 0.0]),
         info=np.zeros(3, dtype=np.int64),
         independence=np.array([1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 1.0, 0.0, *np.zeros(MOST_PASSED)]),
-        **_zeros(vd=V, y=(2, 6 + int(n.max())), functions=(m.functions.kind.size, 3), user=m.user_count, drift=4),
+        **_zeros(vd=V, y=(2, 6 + int(n.max())), functions=(F, 3), earlier=(F, 3), user=m.user_count, drift=4),
         passed=np.zeros((MOST_PASSED + 1, m.bodies.mass.size + V) if keeps_passed else (0, 0)),
     )
 

@@ -6,7 +6,7 @@ the twin (`ffr_dyn.integrators.ros2.Twin`), which keeps its amplitude: with R of
     s = max |R(h) - R(r h)| / (r^p - 1),    v = 1.5 max |R(h) - T(h)|,    error = max(s, v),
 
 over all rows and components of an output. The factor is for vibration that is resolved in part, where the twin errs, too.
-Where a force jumps at a time, or a servo is asked for a rate that does, methods are of first order, and p is 1.
+Where a function of time breaks and steps do not end there, since nobody has told it, methods are of first order, and p is 1.
 Steps up to twice as long that change an output by more than a tenth of its range, as where they jump over an impact, have no
 order yet: p is 1 then.
 
@@ -34,16 +34,19 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
+from typing import Any
 
 import numpy as np
 
-from ffr_dyn.functions.operations import ABS, MAX, MIN, SIGN, STEP
-from ffr_dyn.functions.time_functions import OPERATION, PIECEWISE
-from ffr_dyn.kernels.tables import Functions
+from ffr_dyn.compile.scene_tables import System
+from ffr_dyn.functions.breaks import hidden_breaks
+from ffr_dyn.functions.operations import ACOS, ASIN, POWER, SQRT
+from ffr_dyn.functions.time_functions import OPERATION
+from ffr_dyn.kernels.functions import ROUNDING as OF_TIME
+from ffr_dyn.kernels.functions import evaluate_functions
+from ffr_dyn.kernels.tables import SINCE
 from ffr_dyn.results.result import Result
-from ffr_dyn.scene.forces import Servo
-from ffr_dyn.scene.scene import Scene
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.units import natural
 
@@ -55,13 +58,17 @@ MIDDLE, FLOOR, WINDOW = 3.0, 2.2, 16  # of amplitudes beside a twin with half th
 TWIN = 2  # order of twins
 PLACES = re.compile(r"\.(position|R|p|angle|stroke|orientation)$")
 LOADS = re.compile(r"\.(force|moment|torque|tension|effort)$")
+OVER_BREAKS = (
+    0.5  # of methods of order three where a break lies within steps: their weights, of both signs, err by more
+)
 PARTLY_STIFF = 2.15  # order of ROS3, of an output of which it is not known whether elastic forces are stiff
 FAR, NEXT = 0.1, 2.0  # of the range, by which a step up to so many times as long makes a difference of order one
 NOISE = (70 / 36) ** 0.5  # by which rows without relation are farther off the curve than they are large
 RATES = {"position": "velocity", "R": "v", "q": "q_dot"}
 CONSTANT = 1e-7  # of the size of a kind: a range below it is rounding, as of the rate of an even turn
 ROUNDING = 1e-10  # of what a scene's mass, length and speed make of a unit
-JUMP = 1e-6  # of the coefficients of a function, beyond which it jumps
+A_FORMULA = "a formula"
+SHARP = {SQRT, POWER, ASIN, ACOS}  # operations that are where their operand turns back at the end of its range
 AT_ONCE = 2e7  # bytes of numbers that are compared side by side
 COARSE = 0.01  # of the range, by which a row may be off the curve through its neighbours
 SEED, GROWN = 1e-2, 1e2  # of rounding, from which an output has grown: it begins below the first, and is a motion above
@@ -117,33 +124,38 @@ def filled(table: Array) -> Array:
     return np.take_along_axis(table, np.where(before < 0, known.argmax(axis=0), before), axis=0)
 
 
-def jumps(scene: Scene, functions: Functions, start: float, end: float) -> bool:
-    """Whether a function of time jumps between two times [s], or its rate does where a servo asks for rates."""
-    rates = any(isinstance(force, Servo) and force.kd > 0 for force in scene.forces)
-    sudden = {SIGN, STEP, *((ABS, MIN, MAX) if rates else ())}
-    for kind, first in zip(functions.kind.tolist(), functions.start.tolist(), strict=False):
-        data = functions.data[first:]
-        if kind == OPERATION and int(data[0]) in sudden:
-            return True
-        if kind == PIECEWISE and _breaks(data, start, end, rates):
-            return True
-    return False
+def untold_breaks(system: System, times: Array) -> dict[str, list[float]]:
+    """When [s], between times (T,) of rows, functions of time break of which that is not told: by what they are for.
+
+    Steps do not end there. They are Python functions, and formulas that are sharp where a root or an angle ends.
+    """
+    functions, told = system.model.functions, system.model.functions.breaks[:, SINCE]
+    found: dict[str, list[float]] = {}
+    for callback in system.user.callbacks:
+        if not callback.with_state:
+            found[callback.what] = hidden_breaks(partial(_three, callback.function), times)
+    sharp = [
+        k
+        for k, (kind, first) in enumerate(zip(functions.kind, functions.start, strict=False))
+        if kind == OPERATION and functions.data[first] in SHARP
+    ]
+    values = np.zeros((functions.kind.size, 3))
+
+    def formula(t: float, row: int) -> Array:
+        evaluate_functions(functions, np.zeros(system.user.count), t, values)
+        return np.array([values[row, 0], 0.0, 0.0])  # derivatives are not numbers where it is sharp
+
+    if sharp:
+        found[A_FORMULA] = [t for row in sharp for t in hidden_breaks(partial(formula, row=row), times)]
+    least = 1e3 * OF_TIME * np.abs(times).max()
+    known = {what: [t for t in at if not (np.abs(told - t) <= least).any()] for what, at in found.items()}
+    return {what: at for what, at in known.items() if at}
 
 
-def _breaks(data: Array, start: float, end: float, rates: bool) -> bool:
-    """Whether a piecewise polynomial in the tables (`ffr_dyn.kernels.functions.piecewise`) jumps, or its rate."""
-    pieces, count = int(data[0]), int(data[1])
-    breaks = data[2 : 3 + pieces]
-    coefficients = data[3 + pieces :][: pieces * count].reshape(pieces, count)
-    for k in np.flatnonzero((breaks[1:-1] > start) & (breaks[1:-1] < end)).tolist():
-        before, width = np.polynomial.Polynomial(coefficients[k]), breaks[k + 1] - breaks[k]
-        after = np.polynomial.Polynomial(coefficients[k + 1])
-        size = np.abs(coefficients).max()
-        if abs(before(width) - after(0.0)) > JUMP * size:
-            return True
-        if rates and abs(before.deriv()(width) - after.deriv()(0.0)) > JUMP * size:
-            return True
-    return False
+def _three(function: Callable[[float], Any], t: float) -> Array:
+    """Value, rate and second derivative of a Python function, zero for those that it does not return."""
+    found: Array = np.concatenate([np.atleast_1d(np.asarray(function(t), float)), np.zeros(3)])[:3]
+    return found
 
 
 def step_errors(run: Result, other: Beside | None, order: float, twins: Sequence[Beside] = ()) -> dict[str, StepError]:

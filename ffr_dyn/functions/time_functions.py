@@ -6,7 +6,7 @@ signal("torque") and, by `ffr_dyn.functions.formula`, formula("0.1 * sin(2 * pi 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import wraps
 from inspect import signature
@@ -140,12 +140,18 @@ def piecewise(breaks: Array, coefficients: Array) -> TimeFunction:
     )
 
 
-def user(function: Callable[[float], object]) -> TimeFunction:
+def user(function: Callable[[float], object], breaks: Sequence[float] = ()) -> TimeFunction:
     """A Python function of t [s] -> value, or -> (value, rate, second derivative) where it drives a joint coordinate.
 
+    breaks : times [s] at which it jumps or has a kink: steps end there, which keeps their order
+
+    Raises InputError for a time that is not finite.
+
     >>> push = fd.user(lambda t: 100.0 * np.exp(-t))
+    >>> on = fd.user(lambda t: 100.0 if t >= 0.3 else 0.0, breaks=[0.3])
     """
-    return TimeFunction(USER, (0.0,), function)
+    times = _numbers("breaks", tuple(breaks)) if len(breaks) else ()
+    return TimeFunction(USER, (0.0, *times), function)
 
 
 def signal(name: str, value: float = 0.0) -> TimeFunction:

@@ -14,6 +14,7 @@ from typing import ClassVar
 from ffr_dyn.integrators.tolerances import Tolerances
 from ffr_dyn.kernels.integrator_api import (
     OK,
+    RESTART,
     CompiledFunction,
     H,
     Tables,
@@ -63,7 +64,7 @@ def dopri5_step(r: Tables, t: float, again: int) -> int:
     """One step of the engine's state from time t; `again` tells that the last one was refused. Returns a status."""
     h, stages = r.clock.time[H], r.stages
     set_diagonal(r, 0.0)
-    if stages.numbers[0] == 0.0:
+    if stages.numbers[0] == 0.0 or again == RESTART:
         status = stabilise(r, t, r.x, r.v)
         if status != OK:
             return status

@@ -37,6 +37,7 @@ from ffr_dyn.kernels.integrator_api import (
     OK,
     PHI,
     PHI_DOT,
+    RESTART,
     USER_FAILED,
     CompiledFunction,
     H,
@@ -240,7 +241,7 @@ def generalised_alpha_step(r: Tables, t: float, again: int) -> int:
     h, s, bodies, number = r.clock.time[H], r.stages, r.model.bodies, r.stages.numbers
     share = (1.0 - number[ALPHA_F]) / (1.0 - number[ALPHA_M])
     square, single = share * number[BETA] * h * h, share * number[GAMMA] * h
-    if number[STARTED] == 0.0:
+    if number[STARTED] == 0.0 or again == RESTART:
         status = start(r, t, (number[ALPHA_M] - number[ALPHA_F]) * h, square, single)
         if status != OK:
             return status

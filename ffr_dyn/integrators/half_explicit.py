@@ -28,6 +28,7 @@ from ffr_dyn.kernels.integrator_api import (
     NOT_CONVERGED,
     NOT_FINITE,
     OK,
+    RESTART,
     TIGHTER,
     TOLERANCE,
     CompiledFunction,
@@ -141,7 +142,7 @@ def half_explicit_step(r: Tables, t: float, again: int) -> int:
     """One step of the engine's state from time t. Returns a status."""
     h, s, bodies, number = r.clock.time[H], r.stages, r.model.bodies, r.stages.numbers
     set_diagonal(r, 0.0)
-    if number[0] == 0.0:
+    if number[0] == 0.0 or again == RESTART:
         status = stabilise(r, t, r.x, r.v)
         if status != OK:
             return status

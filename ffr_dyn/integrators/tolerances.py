@@ -5,7 +5,7 @@ Twin: none, data.
 
 from __future__ import annotations
 
-from dataclasses import KW_ONLY, dataclass
+from dataclasses import KW_ONLY, asdict, dataclass
 
 import numpy as np
 
@@ -47,3 +47,8 @@ def tolerances(relative: float) -> Tolerances:
     >>> method = fd.AdaptiveROS3(fd.tolerances(1e-5))
     """
     return Tolerances(relative, position=0.1 * relative, velocity=relative, elastic=0.01 * relative)
+
+
+def tightened(wanted: Tolerances, times: float) -> Tolerances:
+    """All of them divided by a number."""
+    return Tolerances(**{key: value / times for key, value in asdict(wanted).items()})

@@ -39,6 +39,7 @@ from ffr_dyn.kernels.integrator_api import (
     NOT_FINITE,
     OK,
     PHI,
+    RESTART,
     USER_FAILED,
     CompiledFunction,
     H,
@@ -317,7 +318,7 @@ def iterate(r, t, h):
 def variational_step(r: Tables, t: float, again: int) -> int:
     """One step of the engine's state from time t. Returns a status."""
     h, s = r.clock.time[H], r.stages
-    if s.numbers[STARTED] == 0.0:
+    if s.numbers[STARTED] == 0.0 or again == RESTART:
         status = begin(r, t)
         if status != OK:
             return status

@@ -10,7 +10,7 @@ Twin: `ffr_dyn.equations.motion.equations_of_motion`.
 from ffr_dyn.kernels.bodies import add_product, mass_times, normalise, reduce_forces
 from ffr_dyn.kernels.forces.applied import apply_loads, call_user, count_loads, gravity_field, keep_measured, power
 from ffr_dyn.kernels.forces.implicit import add_to_joints, keep_growth, set_targets, subtract_yield
-from ffr_dyn.kernels.functions import evaluate_functions
+from ffr_dyn.kernels.functions import evaluate_functions, search_break
 from ffr_dyn.kernels.options import inlined
 from ffr_dyn.kernels.output_row import keep
 from ffr_dyn.kernels.rows import evaluate_block
@@ -25,7 +25,13 @@ from ffr_dyn.kernels.solution import (
     reduced_rates,
     solve_back,
 )
-from ffr_dyn.kernels.step_control import controlled_step, interpolate
+from ffr_dyn.kernels.step_control import (
+    interpolate,
+    look_anywhere,
+    look_at_row,
+    step_in_pieces,
+    step_to_break,
+)
 from ffr_dyn.kernels.system import (
     apply_motion,
     evaluate_joints,
@@ -50,6 +56,7 @@ from ffr_dyn.kernels.tables import (
     FAILED,
     FILLED,
     FRESH,
+    FROM,
     HERE,
     IN_DAMPING,
     IN_USE,
@@ -70,6 +77,7 @@ from ffr_dyn.kernels.tables import (
     SPACING,
     TIGHTER,
     TOLERANCE,
+    UP_TO,
     USER_FAILED,
     Model,
     N,
@@ -110,14 +118,23 @@ def by_method(model: Model) -> bool:
 # ---- one evaluation: right-hand sides, constraint rows, factors ----------------------------------------------------------
 
 
+@inlined
+def evaluate_time(r, t, x, v):
+    """Functions of time, and those in Python, at t. Returns whether they have values."""
+    seen = min(max(t, r.clock.time[FROM]), r.clock.time[UP_TO])
+    if not call_user(r.model.user_address, seen, x, v, r.work.user):
+        return False
+    evaluate_functions(r.model.functions, r.work.user, seen, r.work.functions)
+    return True
+
+
 @entry_point()
 def evaluate_bodies(r: Tables, t: float, x: Vector, v: Vector) -> int:
     """Functions of time, then inertia, forces and factors of all bodies at (t, x, v)."""
     m, w, x, v = r.model, r.work, vector_at(x, r.x.size), vector_at(v, r.v.size)
     w.info[EVALUATIONS] += 1
-    if not call_user(m.user_address, t, x, v, w.user):
+    if not evaluate_time(r, t, x, v):
         return USER_FAILED
-    evaluate_functions(m.functions, w.user, t, w.functions)
     gravity_field(m.gravity, m.base, w.functions, w.field)
     failed = factorise_bodies(w.field, m.bodies, w.bodies, x, v)
     if failed >= 0:
@@ -195,10 +212,8 @@ def evaluate_rows(r: Tables, x: Vector, v: Vector) -> int:
 @entry_point()
 def evaluate_rows_at(r: Tables, t: float, x: Vector, v: Vector) -> int:
     """`evaluate_rows` at another time."""
-    m, w = r.model, r.work
-    if not call_user(m.user_address, t, vector_at(x, r.x.size), vector_at(v, r.v.size), w.user):
+    if not evaluate_time(r, t, vector_at(x, r.x.size), vector_at(v, r.v.size)):
         return USER_FAILED
-    evaluate_functions(m.functions, w.user, t, w.functions)
     return evaluate_rows(r, x, v)
 
 
@@ -207,9 +222,8 @@ def evaluate_loads(r: Tables, t: float, x: Vector, v: Vector) -> int:
     """Right-hand sides (V,), body axes, of the applied loads alone at (t, x, v)."""
     m, w = r.model, r.work
     xs, vs = vector_at(x, r.x.size), vector_at(v, r.v.size)
-    if not call_user(m.user_address, t, xs, vs, w.user):
+    if not evaluate_time(r, t, xs, vs):
         return USER_FAILED
-    evaluate_functions(m.functions, w.user, t, w.functions)
     turn_bodies(m.bodies.where, w.bodies, xs, vs)
     evaluate_markers(r, IN_USE, x, v)
     fill(w.bodies.f, 0.0)
@@ -450,8 +464,16 @@ def load_powers(r: Tables, out: Record, row: int) -> int:
 
 
 @entry_point()
+def find_break(r: Tables, start: float, end: float) -> int:
+    """The first break of functions of time within (start, end], in `clock.found`."""
+    search_break(r.model.functions, r.work, start, end, r.clock.found)
+    return OK
+
+
+@entry_point()
 def record_state(r: Tables, t: float, out: Record, row: int) -> int:
     """Evaluate the engine's state at time t and keep it as a row of the record."""
+    look_at_row(r, find_break, t)
     status = evaluate_exact(r, t, r.x, r.v)
     if status == OK:
         keep_measured(r.work.loads)
@@ -459,6 +481,7 @@ def record_state(r: Tables, t: float, out: Record, row: int) -> int:
         if count_loads(r.model.loads) > 0:
             load_powers(r, out, row)
         keep(r.model, r.work, t, r.x, r.v, out, row)
+    look_anywhere(r.clock.time)
     return status
 
 
@@ -466,9 +489,23 @@ def record_state(r: Tables, t: float, out: Record, row: int) -> int:
 def step(r: Tables, t: float, again: int) -> int:
     """One step of the engine's state from time t, by the method of the engine: its own function stands in this place.
 
-    again : 1 where the last step, from the same time, was refused
+    again : 1 where the last step, from the same time, was refused; RESTART
     """
     return OK
+
+
+@entry_point()
+def settle(r: Tables, t: float) -> int:
+    """Bring the state onto constraints whose rates have jumped: the velocities change by an impulse, which springs, dampers
+    and elastic forces have no part in."""
+    set_diagonal(r, 0.0)
+    return stabilise(r, t, r.x, r.v)
+
+
+@entry_point()
+def whole_step(r: Tables, t: float, again: int) -> int:
+    """One step in as many pieces as functions of time break it into."""
+    return step_in_pieces(r, step, find_break, settle, t, again)
 
 
 @entry_point()
@@ -478,9 +515,11 @@ def close_row(r: Tables, t: float) -> int:
     if r.work.diagonal[0] < 0.0:
         set_diagonal(r, 0.0)  # a row may come before the first step
     if tolerance > 0.0:
+        look_at_row(r, find_break, t)
         status = evaluate_rows_at(r, t, r.x, r.v)
         if status == OK and tolerance < largest(r.work.rows.Phi) < GROSS:
             status = stabilise(r, t, r.x, r.v)
+        look_anywhere(r.clock.time)
     return status
 
 
@@ -491,7 +530,7 @@ def run(r: Tables, start: float, out: Record) -> int:
     steps[FILLED] = 0
     for row in range(out.time.size):
         for _ in range(steps[PER_ROW]):
-            status = numbered_step(r, step, start + steps[NEXT] * h)
+            status = numbered_step(r, whole_step, start + steps[NEXT] * h)
             if status != OK:
                 return status
             steps[NEXT] += 1
@@ -514,13 +553,14 @@ def run_controlled(r: Tables, start: float, out: Record) -> int:
     for row in range(out.time.size):
         t = start + (steps[NEXT] + steps[PER_ROW]) * r.clock.time[SPACING]
         while c.numbers[NOW] < t:
-            status = controlled_step(r, step)
+            status = step_to_break(r, step, find_break, settle)
             if status != OK:
                 return status
         copy(c.held_x, r.x)
         copy(c.held_v, r.v)
         interpolate(r, t)
         position, velocity = r.work.drift[PHI], r.work.drift[PHI_DOT]  # of the steps, not of the rows between them
+        look_at_row(r, find_break, t)
         status = stabilise(r, t, r.x, r.v)
         r.work.drift[PHI], r.work.drift[PHI_DOT] = position, velocity
         if status == OK:

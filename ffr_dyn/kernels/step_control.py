@@ -1,4 +1,8 @@
-"""Steps chosen by their error, and the states between two of them.
+"""Steps that end where functions of time break; steps chosen by their error, and the states between two of them.
+
+A step that has a jump or a kink of a force, a target or a driver within it is of first order, whatever the method, and by how
+much it errs depends on where it lies. So a step ends there, its functions looked at before the break alone, and another one
+goes on from there: what a method keeps from earlier steps is worth nothing then.
 
 A method leaves an estimate of its error in `stages.x[0]`, `stages.v[0]`, and does its step again, shorter, when told so. The
 controller is proportional-integral (Gustafsson 1991; Hairer & Wanner 1996, IV.8).
@@ -7,7 +11,10 @@ Twin: the statement above, held by
 `tests/ffr_dyn/integrators/test_integrators_adaptive.py::test_the_error_follows_the_tolerance`.
 """
 
+import math
+
 from ffr_dyn.kernels.bodies import normalise, position_rates
+from ffr_dyn.kernels.functions import ROUNDING, has_breaks
 from ffr_dyn.kernels.options import inlined, kernel
 from ffr_dyn.kernels.singular_positions import BESIDE
 from ffr_dyn.kernels.tables import (
@@ -16,16 +23,24 @@ from ffr_dyn.kernels.tables import (
     CLOSEST,
     END,
     ERROR,
+    FROM,
     HERE,
     IN_V,
     IN_X,
+    LONGEST,
     NOW,
     OK,
     ORDER,
     RELATIVE,
+    RESTART,
+    SEEN,
     SHORTEST,
+    SINCE,
+    SPACING,
     STEP,
     STEP_TOO_SMALL,
+    UNTIL,
+    UP_TO,
     USER_FAILED,
     H,
     N,
@@ -39,6 +54,67 @@ SAFETY, SMALLEST, LARGEST = 0.9, 0.2, 5.0
 LENGTHS = (0.83, 1.2, 0.7, 1.45)
 CLOSER = 0.05
 SHORTER = 0.8  # where none of them will do for the end
+NEAR = 1e-9  # of a step: a break so near to its ends is at them
+
+
+@inlined
+def look_anywhere(time):
+    """Functions of time are looked at where they are asked for."""
+    time[FROM], time[UP_TO] = -math.inf, math.inf
+
+
+@inlined
+def look_at_row(r, find, t):
+    """Functions of time that break at a row of results are looked at on the side that the row shows."""
+    time, found = r.clock.time, r.clock.found
+    if not has_breaks(r.model.functions):
+        return
+    least = ROUNDING * (abs(t) + time[SPACING])
+    find(r, t - least, t + least)
+    if found[SEEN] < math.inf:
+        time[FROM] = time[UP_TO] = found[SEEN]
+
+
+@inlined
+def look_behind(r, find, t, near):
+    """Functions of time are looked at from the start of a step on, behind what breaks there. Returns whether one does."""
+    found, since = r.clock.found, t
+    find(r, t - near, t + near)
+    breaks = found[SINCE] < math.inf
+    while found[SINCE] < math.inf:
+        since = found[SINCE]
+        find(r, since, t + near)
+    r.clock.time[FROM], r.clock.time[UP_TO] = since, math.inf
+    return breaks
+
+
+@inlined
+def step_in_pieces(r, step, find, settle, t, again):
+    """One step from time t in pieces that end where functions of time break. Returns a status."""
+    time, found = r.clock.time, r.clock.found
+    h = time[H]
+    if not has_breaks(r.model.functions):
+        return step(r, t, again)
+    end, near = t + h, NEAR * h + ROUNDING * abs(t)
+    find(r, t - h - near, t + near)
+    before = found[SINCE]
+    find(r, t + near, end + near)
+    if before == math.inf and found[SINCE] == math.inf:
+        return step(r, t, again)
+    now, last, status = t, False, OK
+    while status == OK and not last:
+        if look_behind(r, find, now, near):
+            status = settle(r, now)
+        find(r, now + near, end + near)
+        last = not found[SINCE] < end - near
+        since, time[UP_TO] = found[SINCE], found[UNTIL]
+        time[H] = (end if last else found[UNTIL]) - now
+        if status == OK:
+            status = step(r, now, RESTART)
+        now = since
+    time[H] = h
+    look_anywhere(time)
+    return status
 
 
 @kernel
@@ -55,13 +131,36 @@ def worst(error, before, after, weight, relative, h):
 
 
 @inlined
-def controlled_step(r, step):
+def step_to_break(r, step, find, settle):
+    """One accepted step that ends, at the latest, where a function of time breaks. Returns a status."""
+    numbers, time, found = r.control.numbers, r.clock.time, r.clock.found
+    numbers[STEP] = min(numbers[STEP], numbers[LONGEST])
+    if not has_breaks(r.model.functions):
+        return controlled_step(r, step, 0)
+    now, wanted = numbers[NOW], numbers[STEP]
+    near = numbers[SHORTEST] + ROUNDING * abs(now)
+    fresh = look_behind(r, find, now, near)
+    find(r, now + near, now + wanted + near)
+    time[UP_TO], end = found[UNTIL], found[UNTIL]
+    if end < math.inf:
+        numbers[STEP] = end - now
+    status = settle(r, now) if fresh else OK
+    if status == OK:
+        status = controlled_step(r, step, RESTART if fresh else 0)
+    if not numbers[NOW] < end - near:
+        numbers[STEP] = max(numbers[STEP], wanted)
+    look_anywhere(time)
+    return status
+
+
+@inlined
+def controlled_step(r, step, again):
     """One accepted step, of those that `step` does. Returns a status."""
     c, stages = r.control, r.stages
     numbers = c.numbers
     copy(c.x, r.x)
     copy(c.v, r.v)
-    share, again, tried, length = r.work.independence, 0, 0, numbers[STEP]
+    share, tried, length = r.work.independence, 0, numbers[STEP]
     while True:
         h = numbers[STEP]
         r.clock.time[H] = h
@@ -80,7 +179,7 @@ def controlled_step(r, step):
             share[AT_LAST] = share[HERE]
             error = max(error, 1e-8)
             factor = SAFETY * error ** (-0.7 * power) * numbers[ERROR] ** (0.4 * power)
-            if again > 0:
+            if again == 1:
                 factor = min(factor, 1.0)
             numbers[ERROR] = max(error, 1e-4)
             numbers[BEFORE], numbers[NOW] = numbers[NOW], numbers[NOW] + h

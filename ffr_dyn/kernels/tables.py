@@ -151,12 +151,21 @@ class Pattern(NamedTuple):
     update: I1  # (U,) targets of the updates by column, in loop order
 
 
+# Of a break of functions of time [s]: the last time before it, the first behind it, and that at which a row there looks.
+UNTIL, SINCE, SEEN = range(3)
+RESTART = (
+    2  # of a step (`again`): functions of time break nearby, what the method keeps from earlier steps is worth nothing
+)
+
+
 class Functions(NamedTuple):
     """F time functions: kind and numbers (see `functions`)."""
 
     kind: I1  # (F,)
     start: I1  # (F + 1,)
     data: F1  # pooled
+    breaks: F2  # (K, 3) of functions that are given in pieces, in order, see `UNTIL` and what follows it
+    switches: I2  # (J, 2) functions a, b: something breaks where a - b changes sign; where a does, where b is -1
 
 
 class Loads(NamedTuple):
@@ -303,6 +312,7 @@ class Work(NamedTuple):
     vd: F1  # (V,)
     y: F2  # (2, longest body)
     functions: F2  # (F, 3) value, first and second time derivative
+    earlier: F2  # (F, 3) the same where the search for a break begins
     user: F1  # (user_count,)
     diagonal: F1  # (1,) gamma h of the elastic diagonal that is in place (see `entry_points.set_diagonal`), or -1
     implicit: F1  # (5,) by the names above
@@ -330,7 +340,7 @@ class Stages(NamedTuple):
 
 
 # Numbers of `Clock.time`, `Clock.steps`, `Clock.gains`.
-H, SPACING = range(2)
+H, SPACING, FROM, UP_TO = range(4)
 NEXT, PER_ROW, FILLED = range(3)
 ALPHA, BETA, TOLERANCE = range(3)
 
@@ -338,7 +348,9 @@ ALPHA, BETA, TOLERANCE = range(3)
 class Clock(NamedTuple):
     """Which steps are to be done; step number k begins at the start of the run + k h."""
 
-    time: F1  # (2,) step h [s]; spacing of the numbered steps, which is h unless the method chooses its steps
+    time: F1  # (4,) step h [s]; spacing of the numbered steps, which is h unless the method chooses its steps; times within
+    # which functions of time are looked at, so that a step sees none of what lies behind a break
+    found: F1  # (3,) the last break that was looked for, infinite where there was none
     steps: I1  # (3,) number of the next step, steps from row to row, rows filled
     gains: F1  # (3,) Baumgarte's alpha and beta, tolerance of the projection
 
@@ -350,7 +362,7 @@ class Control(NamedTuple):
     """
 
     numbers: F1  # step to be tried, time of the state, time where the last step began, last error, relative tolerance,
-    # order of the error estimate, least step
+    # order of the error estimate, least step, longest step
     counts: I1  # (2,) steps accepted, steps tried again
     weight_x: F1  # (X,) absolute tolerances of positions
     weight_v: F1  # (V,) of velocities; negative where the velocity times the step counts
@@ -361,7 +373,7 @@ class Control(NamedTuple):
 
 
 # Numbers of `Control.numbers`.
-STEP, NOW, BEFORE, ERROR, RELATIVE, ORDER, SHORTEST = range(7)
+STEP, NOW, BEFORE, ERROR, RELATIVE, ORDER, SHORTEST, LONGEST = range(8)
 
 
 class Tables(NamedTuple):

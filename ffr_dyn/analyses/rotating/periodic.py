@@ -19,7 +19,7 @@ from ffr_dyn.analyses.settings import MomentSettings
 from ffr_dyn.consistency.assemble import Assembled, assemble
 from ffr_dyn.consistency.doubts import checked
 from ffr_dyn.consistency.evaluation import evaluator, joined, record_states
-from ffr_dyn.consistency.step_error import PARTLY_STIFF, Beside, jumps, step_errors, worst
+from ffr_dyn.consistency.step_error import OVER_BREAKS, PARTLY_STIFF, Beside, step_errors, untold_breaks, worst
 from ffr_dyn.consistency.tangent import sizes_of
 from ffr_dyn.equations.layout import moved
 from ffr_dyn.integrators import ROS3, Integrator
@@ -152,8 +152,8 @@ def _errors(
     except ComputationError:
         return {}
     ratio, order = of.steps / other.steps, PARTLY_STIFF if isinstance(of.method, ROS3) else of.method.order
-    if jumps(system.scene, system.model.functions, of.near.time, of.near.time + of.period):
-        order = 1
+    if untold_breaks(system, result.time):
+        order = OVER_BREAKS if isinstance(of.method, ROS3) else 1
     beside = Beside(result_of(system, _record(assembled, of, again), {}, None, outputs), ratio)
     errors = step_errors(result, beside, order)
     attributes: dict[str, Any] = {

@@ -386,7 +386,11 @@ FUNCTIONS = {
 @pytest.mark.parametrize("t", [-0.5, 0.0, 0.1, 0.3, 0.69, 1.9999, 2.0, 2.5])
 def test_compiled_time_functions_equal_the_readable_ones(function, t):
     tables = Functions(
-        np.array([function.kind]), np.array([0, len(function.data)]), np.array(function.data, dtype=float)
+        np.array([function.kind]),
+        np.array([0, len(function.data)]),
+        np.array(function.data, dtype=float),
+        np.zeros((0, 3)),
+        np.zeros((0, 2), dtype=np.int64),
     )
     out = np.zeros((1, 3))
     evaluate_functions(tables, np.zeros(0), t, out)
