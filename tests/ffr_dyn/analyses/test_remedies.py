@@ -866,8 +866,8 @@ INPUT = [
     Case(lambda: fd.steady(DRAGGED), lambda: fd.steady(TURNING)),
     Case(lambda: fd.steady(governor(1000.0)), lambda: fd.steady(governor(1.0))),
     Case(lambda: fd.periodic(swung(0.0), period=1 / 1.3), lambda: fd.periodic(swung(1.0), period=1 / 1.3)),
-    Case(lambda: fd.periodic(struck(0.05), period=1 / 1.3), lambda: fd.periodic(struck(5.0), period=1 / 1.3)),
-    Case(lambda: fd.periodic(struck(0.2), period=1 / 1.3), lambda: fd.periodic(struck(5.0), period=1 / 1.3)),
+    Case(lambda: fd.periodic(struck(0.02), period=1 / 1.3), lambda: fd.periodic(struck(5.0), period=1 / 1.3)),
+    Case(lambda: fd.periodic(struck(0.5), period=1 / 1.3), lambda: fd.periodic(struck(5.0), period=1 / 1.3)),
     Case(lambda: fd.steady(on_springs(stiff=False)), lambda: fd.steady(on_springs(stiff=True))),
     Case(
         lambda: fd.floquet_motion(swung(1.0), 9, period=1 / 1.3),
