@@ -12,7 +12,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ffr_dyn.compile.engine import row_filler
+from ffr_dyn.compile.engine import Engine, row_filler
 from ffr_dyn.compile.workspace import new_record
 from ffr_dyn.consistency.evaluation import evaluate, evaluated_mass_matrix, free_motions
 from ffr_dyn.consistency.failure import failure
@@ -58,19 +58,27 @@ def periods_of_product(of: Turns) -> float:
 def _steps(of: Turns, begins: Array, x: Array, v: Array) -> Iterator[tuple[Array, Array]]:
     """Positions (S, 4 d, X) and velocities (S, 4 d, V) where the steps from states (S, X), (S, V), pushed, begin and end."""
     xs, vs = _pushed(of, begins, x, v)
-    engine, rows, start = engine_of(of, x[0], v[0]), new_record(of.system, 1), of.near.time
-    fill, clock = row_filler(engine, rows), engine.tables.clock.steps
     ended = np.empty_like(xs), np.empty_like(vs)
+    engine, rows, start = engine_of(of, x[0], v[0]), new_record(of.system, 1), of.near.time
+    fill, clock, d = row_filler(engine, rows), engine.tables.clock.steps, of.near.steps.size
+    numbers = np.rint(begins * of.steps).astype(int)
     for s, k in np.ndindex(xs.shape[:2]):
-        clock[NEXT] = round(float(begins[s]) * of.steps)
+        clock[NEXT] = numbers[s]
         engine.x[:], engine.v[:] = xs[s, k], vs[s, k]
-        for clock[PER_ROW], states in enumerate(((xs, vs), ended)):
-            status = fill(start)
-            if status != OK:
-                raise failure(of.system, engine.work, status, start)
-            states[0][s, k], states[1][s, k] = engine.x, engine.v
+        if k // d % 2 == 0:  # positions were moved, and are to meet the constraints before the step
+            clock[PER_ROW] = 0
+            _checked(of, engine, fill(start))
+            xs[s, k], vs[s, k] = engine.x, engine.v
+        clock[PER_ROW] = 1
+        _checked(of, engine, fill(start))
+        ended[0][s, k], ended[1][s, k] = engine.x, engine.v
     yield xs, vs
     yield ended
+
+
+def _checked(of: Turns, engine: Engine, status: int) -> None:
+    if status != OK:
+        raise failure(of.system, engine.work, status, of.near.time)
 
 
 def _pushed(of: Turns, begins: Array, x: Array, v: Array) -> tuple[Array, Array]:

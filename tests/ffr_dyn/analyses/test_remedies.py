@@ -900,6 +900,14 @@ INPUT = [
             HINGED, MOMENT, path=None
         ),
     ),
+    Case(
+        lambda: fd.Response(input="base.x", quantities=("bar.b.position.x",), psd=("3:1",)).perform(
+            HINGED, MOMENT, path=None
+        ),
+        lambda: fd.Response(input="base.x", quantities=("bar.b.position.x",), psd=("3:1", "4:1")).perform(
+            HINGED, MOMENT, path=None
+        ),
+    ),
     Case(lambda: fd.mode_motion(fd.linearise(HINGED), 9), lambda: fd.mode_motion(fd.linearise(HINGED), 1)),
     Case(
         lambda: fd.assembly(CLOUD).to_statespace(),
