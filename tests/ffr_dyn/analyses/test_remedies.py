@@ -908,6 +908,10 @@ INPUT = [
             HINGED, MOMENT, path=None
         ),
     ),
+    Case(
+        lambda: fd.response(HINGED, frequencies=(-1.0, 2.0), input="base.x", outputs=("bar.b.position.x",)),
+        lambda: fd.response(HINGED, frequencies=(1.0, 2.0), input="base.x", outputs=("bar.b.position.x",)),
+    ),
     Case(lambda: fd.mode_motion(fd.linearise(HINGED), 9), lambda: fd.mode_motion(fd.linearise(HINGED), 1)),
     Case(
         lambda: fd.assembly(CLOUD).to_statespace(),
