@@ -74,10 +74,8 @@ def amiss(account: Account, method: str, remedy: str) -> list[str]:
         "has come that no force or driver has put in" if worst > 0 else "has gone that no force or driver has taken out"
     )
     cause = "what the steps do not resolve grows" if worst > 0 else "what the steps do not resolve is damped by them"
-    return [
-        f"by t = {when:.6g} s energy of {abs(worst):.3g} J {way}, {abs(worst) / most:.2g} of the largest kinetic and strain "
-        f"energy: {cause} ({method}); {remedy}"
-    ]
+    share = f", {abs(worst) / most:.2g} of the largest kinetic and strain energy" if most > 0 else ""
+    return [f"by t = {when:.6g} s energy of {abs(worst):.3g} J {way}{share}: {cause} ({method}); {remedy}"]
 
 
 def _left_open(known: Array) -> Array:

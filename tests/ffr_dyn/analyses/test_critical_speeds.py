@@ -88,7 +88,16 @@ def test_a_critical_speed_may_be_one_of_the_list_and_the_rotor_may_turn_backward
     assert sorted(name.rpartition(", ")[2] for name in found["names"]) == ["backward", "forward"]
 
 
-@pytest.mark.parametrize("speeds", [(0, 50, 150), (0, 50, 105, 150), (0, 90, 103, 107, 150), (90, 120), (-150, 0)])
+@pytest.mark.parametrize(
+    "speeds",
+    [
+        (0, 50, 105, 150),
+        *(
+            pytest.param(more, marks=pytest.mark.slow)
+            for more in ((0, 50, 150), (0, 90, 103, 107, 150), (90, 120), (-150, 0))
+        ),
+    ],
+)
 def test_a_flat_shaft_is_unstable_between_its_critical_speeds(speeds):
     """The roots of both stiffnesses over the mass are the ends of the range; the backward whirl meets the order between."""
     found = fd.campbell(jeffcott((1e4, 1.21e4)), speeds=speeds, modes=2).attributes
