@@ -42,9 +42,8 @@ def product_of_steps(of: Turns, record: Record) -> Array | None:
     if harmonics[SAMPLES // 2] > ABRUPT * harmonics[0]:
         return None
     found = np.eye(of.scale.size)
-    for at in np.array_split(
-        np.arange(of.steps) / of.steps, of.rows
-    ):  # a few at a time: for many BLAS wakes its threads
+    # A few at a time: for many BLAS wakes its threads.
+    for at in np.array_split(np.arange(of.steps) / of.steps, of.rows):
         for step in np.tensordot(_trigonometric(at, begins), steps, axes=1):
             found = step @ found
     return found
@@ -82,7 +81,9 @@ def _checked(of: Turns, engine: Engine, status: int) -> None:
 
 
 def _pushed(of: Turns, begins: Array, x: Array, v: Array) -> tuple[Array, Array]:
-    """What the free motions at states (S, X), (S, V) make of them: of positions, of velocities; and then backwards."""
+    """What the free motions at states (S, X), (S, V) make of them: of positions, of velocities; and then backwards.
+
+    `ffr_dyn.equations.layout.moved` of many states at once."""
     place, at, d = of.system.layout, of.near.at, of.near.steps.size
     motions = np.empty((len(x), d, place.v_size))
     for s, begin in enumerate(begins):
