@@ -150,6 +150,8 @@ def user(function: Callable[[float], object], breaks: Sequence[float] = ()) -> T
     >>> push = fd.user(lambda t: 100.0 * np.exp(-t))
     >>> on = fd.user(lambda t: 100.0 if t >= 0.3 else 0.0, breaks=[0.3])
     """
+    if np.ndim(breaks) != 1:
+        raise InputError(f"breaks: {breaks!r} is no list of times [s]; give breaks=[{breaks!r}]")
     times = _numbers("breaks", tuple(breaks)) if len(breaks) else ()
     return TimeFunction(USER, (0.0, *times), function)
 

@@ -859,6 +859,7 @@ INPUT = [
     ),
     Case(lambda: followed(200.0), lambda: followed(200.0, 0.01)),
     Case(lambda: torn(1.0), lambda: torn(0.4)),
+    Case(lambda: fd.user(len, breaks=0.5), lambda: fd.user(len, breaks=[0.5])),  # type: ignore[arg-type]
     Case(lambda: fd.periodic(HINGED), lambda: fd.periodic(EVENLY)),
     Case(lambda: fd.periodic(EVENLY, period=-1.0), lambda: fd.periodic(EVENLY)),
     Case(lambda: fd.periodic(EVENLY, period=0.3), lambda: fd.periodic(EVENLY)),
