@@ -60,7 +60,7 @@ class EnergyWatch:
     """The account of the energy in the rows so far.
 
     spacing  : of the steps, or of the rows of a method that chooses its steps [s]
-    complete : gives a record the reactions of redundant rows
+    complete : gives a record the reactions of redundant rows;  moments : of `Account`
     begun    : [J] at the start, with what turned out to have a source later;  highest : [J] energy of gravity so far
     time, powers, work : of the last row, and of each force and driver [W] and [J]
     anchor   : the last row with an energy that is no wonder;  account : of all energy, both ways
@@ -71,6 +71,7 @@ class EnergyWatch:
     gains: tuple[float, float, float]
     spacing: float
     complete: Callable[[Record], Record]
+    moments: Array = field(default_factory=lambda: np.zeros(0))
     begun: float = 0.0
     highest: float = -np.inf
     time: float = 0.0
@@ -80,7 +81,7 @@ class EnergyWatch:
     account: Account = field(init=False)
 
     def __post_init__(self) -> None:
-        self.account = Account(self.system)
+        self.account = Account(self.system, self.moments)
 
     def amiss(self) -> list[str]:
         """Notes on energy that forces and drivers do not account for, too little to stop the run."""

@@ -17,10 +17,12 @@ from typing import Any, ClassVar, Literal, get_args
 import numpy as np
 
 from ffr_dyn.analyses.events import Event
-from ffr_dyn.analyses.integration import LOOKS, check_method, check_output_step, evaluation_cost, integrate
+from ffr_dyn.analyses.integration import LOOKS, check_method, check_output_step, evaluation_cost, fast_within, integrate
 from ffr_dyn.analyses.registry import OverTime, option
 from ffr_dyn.analyses.rotating.periodic import periodically
 from ffr_dyn.analyses.settings import Settings
+from ffr_dyn.compile.divided_steps import Fast, fast_of
+from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.consistency.assemble import Assembled, assemble
 from ffr_dyn.consistency.quasi_static import quasi_static
 from ffr_dyn.consistency.step_error import (
@@ -131,7 +133,8 @@ class _Runs:
     def untold(self) -> dict[str, list[float]]:
         """When [s] functions of time break without steps that end there, by what they are for."""
         count = round((self.how["end"] - self.start) / self.output_step)
-        return untold_breaks(self.assembled.system, np.linspace(self.start, self.how["end"], count + 1))
+        times, fast = np.linspace(self.start, self.how["end"], count + 1), self.how["fast"]
+        return untold_breaks(self.assembled.system, times, () if fast is None else fast.jumps[:, 1].tolist())
 
     def run(self, method: Integrator, **more: Any) -> Result:
         """One run."""
@@ -208,6 +211,7 @@ def forward(
     wanted = Within() if method is None else method
     if isinstance(wanted, Within) or stabilisation == Projection():
         common["stabilisation"] = _tight(stabilisation, getattr(wanted, "accuracy", Within().accuracy))
+    common["fast"] = _fast(assembled.system, wanted, start, end, output_step)
     runs = _Runs(scene, assembled, start, output_step, common, begin)
     kept = {"events": events, "path": path, "resume": resume}
     method, count = _resumed(resume, wanted, output_step)
@@ -218,6 +222,13 @@ def forward(
     if check is None and _cost(assembled, told.result) < QUICK:
         told = _checked(runs, method, count, kept, told.result)
     return _finished(runs, told, resume if path is None else path)
+
+
+def _fast(system: System, wanted: Integrator | Within, start: float, end: float, output_step: float) -> Fast | None:
+    """What functions of time do within the steps of a method, or within those of the first trial."""
+    if isinstance(wanted, Within):
+        return fast_of(system, start, end, output_step, output_step / FIRST)
+    return fast_within(system, wanted, start, end, output_step)
 
 
 def _tight(stabilisation: Stabilisation, accuracy: float) -> Stabilisation:

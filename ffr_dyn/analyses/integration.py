@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, get_args
 
@@ -15,6 +15,7 @@ from ffr_dyn.analyses.energy import EnergyWatch
 from ffr_dyn.analyses.events import Event, Watcher
 from ffr_dyn.closing.limits import with_limits
 from ffr_dyn.closing.passed_positions import passed_in_words
+from ffr_dyn.compile.divided_steps import Fast, divided, fast_of
 from ffr_dyn.compile.engine import Engine, fill_rows, new_engine, record_row
 from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.compile.workspace import new_record
@@ -96,6 +97,7 @@ def integrate(
     stopwatch: Stopwatch | None = None,
     assembled: Assembled | None = None,
     looks: int = LOOKS,
+    fast: Fast | None = None,
 ) -> Result:
     """Integrate the equations of motion of a scene from `start` to `end` [s], keeping a row every `output_step` [s].
 
@@ -108,6 +110,7 @@ def integrate(
     stopwatch   : takes the time of the integrator's compiled loop
     assembled   : what `assemble` made of the scene at `start`, for programs that run it more than once
     looks       : states from row to row of which work is added up, where the method chooses its steps
+    fast        : what functions of time do within steps, which are divided there
 
     Raises InputError for a scene or settings that cannot be used, ComputationError when the run fails: with the time,
     the body or joint, the likely cause and what to change. Energy that no force or driver has put in is a failure.
@@ -123,10 +126,11 @@ def integrate(
     wanted = selected(assembled.system, outputs)
     path = resume if path is None else path
     mark = "" if path is None else _fingerprint(assembled, method, stabilisation, start, output_step, wanted)
+    assembled = assembled if fast is None else _with_divided_steps(assembled, fast, spacing)
     header = _header(scene, assembled, method, stabilisation, (start, end, output_step))
     shown_alone = path is None and not events
     kept = _kept(assembled.system, wanted, rows) if shown_alone else Measured(assembled.system, wanted)
-    run = _begun(assembled, method, stabilisation, start, spacing, kept, resume, mark)
+    run = _begun(assembled, method, stabilisation, start, spacing, kept, resume, mark, fast)
     _check_resumed(run, substeps * rows, output_step / substeps)
     watcher = _watcher(assembled, run, method, stabilisation, spacing, events, resume) if events else None
     watch = Stopwatch() if stopwatch is None else stopwatch
@@ -140,6 +144,23 @@ def integrate(
         if writer is not None:
             writer.close("complete", header | account)
     return _result(scene, run, header | account | {"status": "complete"})
+
+
+def fast_within(system: System, method: Integrator, start: float, end: float, output_step: float) -> Fast | None:
+    """What functions of time do within the steps of a method, or within a LOOKS of a row where it chooses them."""
+    check_output_step(output_step)
+    check_method(method)
+    return fast_of(system, start, end, output_step, output_step / LOOKS if method.controlled else method.step)
+
+
+def _with_divided_steps(assembled: Assembled, fast: Fast, step: float) -> Assembled:
+    every = assembled.all_rows
+    return replace(
+        assembled,
+        system=divided(assembled.system, fast, step),
+        all_rows=None if every is None else divided(every, fast, step),
+        notes=(*assembled.notes, *fast.words),
+    )
 
 
 def _kept(system: System, wanted: Mapping[str, Entry], rows: int) -> Kept:
@@ -225,6 +246,7 @@ def _begun(
     kept: Kept,
     resume: str | Path | None,
     mark: str,
+    fast: Fast | None,
 ) -> _Run:
     """The run at its start, or where the file to resume left it."""
     system, gained = assembled.system, gains(stabilisation)
@@ -233,7 +255,8 @@ def _begun(
     engine = new_engine(
         system, assembled.x, assembled.v, method, gained, start=start, spacing=spacing, keeps_passed=dropped
     )
-    energy = EnergyWatch(system, method, gained, spacing, lambda rows: with_all_reactions(assembled, rows))
+    moments = np.zeros(0) if fast is None else fast.moments
+    energy = EnergyWatch(system, method, gained, spacing, lambda rows: with_all_reactions(assembled, rows), moments)
     if resume is not None and Path(resume).exists():
         return _resumed(Path(resume), mark, engine, energy, seen, kept)
     return _started(assembled, engine, energy, seen, start, kept)

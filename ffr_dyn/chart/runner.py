@@ -26,7 +26,7 @@ from typing import Any, Protocol, TypeVar
 import numpy as np
 
 from ffr_dyn.analyses.forward import Beginning, begun
-from ffr_dyn.analyses.integration import integrate
+from ffr_dyn.analyses.integration import fast_within, integrate
 from ffr_dyn.chart.measures import Measure
 from ffr_dyn.chart.variants import Variant
 from ffr_dyn.compile.first_use import ensure_compiled
@@ -177,6 +177,7 @@ def _clocked(assembled: Assembled, method: Any, job: Job, outputs: tuple[str, ..
         assembled.system.scene,
         **job.span.integrated,
         assembled=assembled,
+        fast=fast_within(assembled.system, method, **job.span.integrated),
         method=method,
         stabilisation=job.stabilisation,
         outputs=outputs,

@@ -41,11 +41,13 @@ class Callback:
 class FunctionTable:
     """Collects time functions while a scene is compiled, the callbacks of the user with their slots, and the scene's inputs.
 
-    signals : by name, the initial value and the numbers of the functions that hold it
+    purposes : what each function is for
+    signals  : by name, the initial value and the numbers of the functions that hold it
     """
 
     def __init__(self) -> None:
         self.functions: list[TimeFunction] = []
+        self.purposes: list[str] = []
         self.callbacks: list[Callback] = []
         self.slots = 0
         self.signals: dict[str, tuple[float, list[int]]] = {}
@@ -58,6 +60,7 @@ class FunctionTable:
             rows = [float(self.add(operand, what)) for operand in function.operands]
             function = TimeFunction(OPERATION, (*function.data, rows[0], rows[-1]))
         self.functions.append(function)
+        self.purposes.append(what)
         if function.name:
             self._remember(function)
         return len(self.functions) - 1

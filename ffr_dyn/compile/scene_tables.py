@@ -33,6 +33,7 @@ class System(Brief):
 
     blocks : in elimination order, as the rows in the tables;  user : keeps the callback of the user's functions alive
     inputs : where the numbers of a signal begin among those of the time functions, by its name
+    purposes : what each time function is for
     words : the tables as `pack` writes them
     """
 
@@ -43,6 +44,7 @@ class System(Brief):
     model: Model
     user: UserFunctions
     inputs: Mapping[str, tuple[int, ...]]
+    purposes: tuple[str, ...]
     words: Array
 
     @cached_property
@@ -88,7 +90,8 @@ def compile_scene(scene: Scene, blocks: list[Block] | None = None, relaxation: f
     user = UserFunctions(functions.callbacks, place, scene)
     compiled = Model(**model, user_address=user.address, user_count=user.count, stiff_count=0)  # type: ignore[arg-type]
     piece = in_one_piece(compiled)
-    return System(scene, place, ordered, elimination, piece.tables, user, functions.inputs(), piece.words)
+    inputs, purposes = functions.inputs(), tuple(functions.purposes)
+    return System(scene, place, ordered, elimination, piece.tables, user, inputs, purposes, piece.words)
 
 
 # ---- the user's Python functions ----------------------------------------------------------------------------------
@@ -128,14 +131,30 @@ class UserFunctions:
 
     def _values(self, callback: Callback, t: float, x: Array, v: Array) -> Array:
         arguments = (t, StateView(self.scene, self.place, x, v)) if callback.with_state else (t,)
-        given = np.atleast_1d(np.asarray(callback.function(*arguments), dtype=float))
-        values = np.zeros(callback.size)
-        if given.ndim != 1 or given.size not in callback.sizes:
-            raise InputError(f"the function returned {given!r}, not numbers of the right count")
-        if not np.isfinite(given).all():
-            raise InputError(f"the function returned {given}; it must be finite")
+        given, values = _checked(callback, callback.function(*arguments)), np.zeros(callback.size)
         values[: given.size] = given
         return values
+
+
+def of_time(callback: Callback, t: float) -> Array:
+    """(3,) value, rate and second derivative of a Python function of time, NaN where it does not return them.
+
+    Raises what it raises, and InputError for what it must not return.
+    """
+    values = np.full(callback.size, np.nan)
+    given = _checked(callback, callback.function(t))
+    values[: given.size] = given
+    return values
+
+
+def _checked(callback: Callback, returned: object) -> Array:
+    """The numbers that a Python function has returned."""
+    given = np.atleast_1d(np.asarray(returned, dtype=float))
+    if given.ndim != 1 or given.size not in callback.sizes:
+        raise InputError(f"the function returned {given!r}, not numbers of the right count")
+    if not np.isfinite(given).all():
+        raise InputError(f"the function returned {given}; it must be finite")
+    return given
 
 
 def _at(address: int, size: int) -> Array:

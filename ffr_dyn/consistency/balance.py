@@ -2,7 +2,8 @@
 
 Kinetic, strain and gravity energy and that of undamped springs change by the work of all other forces, of drivers and of
 modal damping. The work is the trapezoid of their powers at the rows; what rows cannot tell of it is known by how much the
-powers bend from row to row, and nothing is said that is less than that.
+powers bend from row to row, and nothing is said that is less than that. Between rows where a function of time breaks, or
+comes and goes, powers at rows tell nothing, and what the energy changes by is taken for work.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ import numpy as np
 
 from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.equations.inertia import damping_matrix
-from ffr_dyn.kernels.tables import Record
+from ffr_dyn.kernels.tables import SINCE, Record
 from ffr_dyn.results.power import measured_values
 from ffr_dyn.results.recorded_motion import View
 from ffr_dyn.scene.force_kinds import forces_of
@@ -25,19 +26,22 @@ AMISS = 0.1  # of the largest kinetic, strain and spring energy: from where it i
 SURE = 3.0  # times what rows leave open of the work
 QUIET = 1e-6  # m^2/s^2, twice the energy by mass that is not looked at
 # Numbers of an account [s], [J], [W]: see `Account`.
-TIME, BEGUN, WORK, OPEN, MOST, WORST, WHEN, POWER, BEFORE = range(9)
+TIME, BEGUN, WORK, OPEN, MOST, WORST, WHEN, POWER, BEFORE, TOTAL = range(10)
 
 
 @dataclass(frozen=True)
 class Account:
     """The account of the energy of a run: the rows so far.
 
-    numbers : (9,) time of the last row, energy at the start, work since, what rows leave open of it, largest energy of motion
-              and strain, largest difference between energy and work, its time, power of the last row and of the one before
+    numbers : (10,) time of the last row, energy at the start, work since, what rows leave open of it, largest energy of
+              motion and strain, largest difference between energy and work, its time, power of the last row and of the one
+              before, energy of the last row
+    moments : (K,) [s] at which functions of time change between rows, beside those that they break at
     """
 
     system: System
-    numbers: Array = field(default_factory=lambda: np.full(9, np.nan))
+    moments: Array = field(default_factory=lambda: np.zeros(0))
+    numbers: Array = field(default_factory=lambda: np.full(10, np.nan))
 
 
 def add_rows(account: Account, rows: Record, powers: Array) -> None:
@@ -47,12 +51,14 @@ def add_rows(account: Account, rows: Record, powers: Array) -> None:
     own = rows.energy[:, 0] + rows.energy[:, 1]
     energy, total = own + np.abs(stored), own + stored + rows.energy[:, 2]  # that of a negative stiffness is below zero
     if np.isnan(numbers[TIME]):
-        numbers[:] = [rows.time[0], total[0], 0.0, 0.0, energy[0], 0.0, rows.time[0], power[0], power[0]]
+        numbers[:] = [rows.time[0], total[0], 0.0, 0.0, energy[0], 0.0, rows.time[0], power[0], power[0], total[0]]
     times = np.append(numbers[TIME], rows.time)
     steps = times[1:] - times[:-1]
     known = np.concatenate([numbers[[BEFORE, POWER]], power])
-    work = numbers[WORK] + np.cumsum(0.5 * steps * (known[1:-1] + known[2:]))
-    left_open = numbers[OPEN] + np.cumsum(steps * _left_open(known))
+    seen = ~_breaks_between(account, times)
+    grown = np.diff(total, prepend=numbers[TOTAL])
+    work = numbers[WORK] + np.cumsum(np.where(seen, 0.5 * steps * (known[1:-1] + known[2:]), grown))
+    left_open = numbers[OPEN] + np.cumsum(steps * _left_open(known) * seen)
     left = total - numbers[BEGUN] - work
     sure = np.where(np.abs(left) > SURE * left_open, left, 0.0)
     worst = int(np.argmax(np.abs(sure)))
@@ -60,6 +66,15 @@ def add_rows(account: Account, rows: Record, powers: Array) -> None:
         numbers[[WORST, WHEN]] = sure[worst], rows.time[worst]
     numbers[MOST] = max(numbers[MOST], float(energy.max()))
     numbers[[TIME, WORK, OPEN, POWER, BEFORE]] = rows.time[-1], work[-1], left_open[-1], known[-1], known[-2]
+    numbers[TOTAL] = total[-1]
+
+
+def _breaks_between(account: Account, times: Array) -> Array:
+    """(T - 1,) whether a function of time breaks or changes between each two of T times."""
+    moments = np.sort(np.concatenate([account.system.model.functions.breaks[:, SINCE], account.moments]))
+    count = np.searchsorted(moments, times, side="right")
+    found: Array = np.diff(count) > 0
+    return found
 
 
 def amiss(account: Account, method: str, remedy: str) -> list[str]:

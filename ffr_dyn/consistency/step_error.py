@@ -72,6 +72,9 @@ SHARP = {SQRT, POWER, ASIN, ACOS}  # operations that are where their operand tur
 AT_ONCE = 2e7  # bytes of numbers that are compared side by side
 COARSE = 0.01  # of the range, by which a row may be off the curve through its neighbours
 SEED, GROWN = 1e-2, 1e2  # of rounding, from which an output has grown: it begins below the first, and is a motion above
+NEVER = (
+    1e-25  # of rounding, below which nothing begins of itself: a force that is written begins there, as exp(-1e4 t**2)
+)
 FIRST_ROWS = 2  # in which what a twin shows may be larger than ever after
 BEYOND = 0.25  # of a row, up to where steps are looked at after the first
 SEEN = 1e-6  # of the range, below which it is not looked for
@@ -124,12 +127,14 @@ def filled(table: Array) -> Array:
     return np.take_along_axis(table, np.where(before < 0, known.argmax(axis=0), before), axis=0)
 
 
-def untold_breaks(system: System, times: Array) -> dict[str, list[float]]:
-    """When [s], between times (T,) of rows, functions of time break of which that is not told: by what they are for.
+def untold_breaks(system: System, times: Array, found_before: Sequence[float] = ()) -> dict[str, list[float]]:
+    """When [s], between times (T,) of rows, functions of time break of which that is neither told nor was found before: by
+    what they are for.
 
     Steps do not end there. They are Python functions, and formulas that are sharp where a root or an angle ends.
     """
-    functions, told = system.model.functions, system.model.functions.breaks[:, SINCE]
+    functions = system.model.functions
+    told = np.concatenate([functions.breaks[:, SINCE], found_before])
     found: dict[str, list[float]] = {}
     for callback in system.user.callbacks:
         if not callback.with_state:
@@ -399,9 +404,10 @@ def from_rounding(run: Result) -> dict[str, float]:
 def _grows_evenly(size: Array, seed: float, motion: float) -> bool:
     """Whether a size (T,) that never falls grows from below a seed to above a motion, exponentially."""
     nonzero = size[size > 0]
-    if nonzero.size == 0 or nonzero[0] > seed or nonzero[-1] < motion:
+    if nonzero.size == 0 or not NEVER * seed <= nonzero[0] <= seed or nonzero[-1] < motion:
         return False
-    decades = np.log(nonzero / nonzero[0]) / np.log(FULL * nonzero[-1] / nonzero[0])
+    log = np.log(nonzero)  # the quotient of the largest and the least may be too large for a number
+    decades = (log - log[0]) / (np.log(FULL) + log[-1] - log[0])
     middle, last = (np.count_nonzero((decades > third) & (decades <= third + 1 / 3)) for third in (1 / 3, 2 / 3))
     return bool(min(middle, last) >= FEW and last <= FEW * (middle + 1))
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ffr_dyn.analyses.forward import Beginning, begun
-from ffr_dyn.analyses.integration import integrate
+from ffr_dyn.analyses.integration import fast_within, integrate
 from ffr_dyn.consistency.assemble import Assembled, assemble
 from ffr_dyn.economy.cost import of_evaluations, of_run
 from ffr_dyn.economy.model_choice import Choice, applied
@@ -96,17 +96,19 @@ def simulated(
 
     say : called with the time reached, a few times a second
     """
+    steps = choice.integrator(span.output_step) if method is None else method
     return integrate(
         made.scene,
         start=span.start,
         end=span.end,
         output_step=span.output_step,
-        method=choice.integrator(span.output_step) if method is None else method,
+        method=steps,
         stabilisation=span.stabilisation,
         outputs=outputs,
         stopwatch=stopwatch,
         progress=say,
         assembled=made.assembled,
+        fast=fast_within(made.assembled.system, steps, span.start, span.end, span.output_step),
     )
 
 

@@ -28,10 +28,10 @@ def declared_breaks(functions: Sequence[TimeFunction]) -> Array:
     found = set[tuple[float, float, float]]()
     for function in functions:
         if function.kind == USER:
-            found |= {_begins(time) for time in function.data[1:]}
+            found |= {begins(time) for time in function.data[1:]}
         if function.kind == PIECEWISE and not function.name:
             times, last = _breaks_of_pieces(function), function.data[2 + int(function.data[0])]
-            found |= {_ends(time) if time == last else _begins(time) for time in times}
+            found |= {_ends(time) if time == last else begins(time) for time in times}
     return np.array(sorted(found)).reshape(-1, 3)
 
 
@@ -51,7 +51,8 @@ def _fixed(functions: Sequence[TimeFunction], pair: tuple[int, int]) -> bool:
     return all(functions[k].kind == POLYNOMIAL and len(functions[k].data) == 1 for k in pair if k >= 0)
 
 
-def _begins(time: float) -> tuple[float, float, float]:
+def begins(time: float) -> tuple[float, float, float]:
+    """A row of `declared_breaks` at which a row shows what begins there."""
     return float(np.nextafter(time, -np.inf)), time, time
 
 

@@ -39,6 +39,10 @@ def _derivatives_of_power(u: float, n: float) -> tuple[float, float]:
     return first, 0.0 if n in (0, 1) else n * (n - 1) * u ** (n - 2)
 
 
+def _derivatives_of_tanh(t: float) -> tuple[float, float]:
+    return (1 - t) * (1 + t), -2 * t * (1 - t) * (1 + t)
+
+
 def _smooth(u: float) -> float:
     x = min(max(u, 0.0), 1.0)
     return 10 * x**3 - 15 * x**4 + 6 * x**5
@@ -72,7 +76,7 @@ _DERIVATIVES: dict[int, Callable[[float], tuple[float, float]]] = {
     EXP: lambda u: (math.exp(u), math.exp(u)),
     LOG: lambda u: (1 / u, -1 / u**2),
     SQRT: lambda u: _derivatives_of_power(u, 0.5),
-    TANH: lambda u: (1 / math.cosh(u) ** 2, -2 * math.tanh(u) / math.cosh(u) ** 2),
+    TANH: lambda u: _derivatives_of_tanh(math.tanh(u)),
     ATAN: lambda u: (1 / (1 + u**2), -2 * u / (1 + u**2) ** 2),
     ASIN: lambda u: ((1 - u**2) ** -0.5, u * (1 - u**2) ** -1.5),
     ACOS: lambda u: (-((1 - u**2) ** -0.5), -u * (1 - u**2) ** -1.5),

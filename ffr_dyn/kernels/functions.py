@@ -73,6 +73,13 @@ def evaluate_functions(functions, user, t, out):
         out[f, 0], out[f, 1], out[f, 2] = value, rate, second
 
 
+@entry
+def sample_functions(functions, user, times, out):
+    """out (T, F, 3) = `evaluate_functions` at times (T,); user (T, U) what Python gives then."""
+    for k in range(times.size):
+        evaluate_functions(functions, user[k], times[k], out[k])
+
+
 # ---- where they break ------------------------------------------------------------------------------------------------------
 
 

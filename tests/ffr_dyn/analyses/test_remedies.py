@@ -293,6 +293,12 @@ def pushed(size: float) -> Scene:
     return replace(HINGED, loads=(Load("push", "bar.b", force=(0, size, 0)),))
 
 
+def shaken(frequency: float, step: float = 1e-2) -> Result:
+    shake = Load("shake", "bar.b", force=(0, formula(f"sin(2 * pi * {frequency} * t)"), 0))
+    end = 100 * step
+    return forward(replace(HINGED, loads=(shake,)), end=end, output_step=step, method=ROS2(step), check=False)
+
+
 def felt(function: Callable) -> Scene:
     return replace(HINGED, loads=(Load("gust", "bar.b", function=function),))
 
@@ -413,6 +419,8 @@ RUNS = [
         p(run, DOUBLE, stabilisation=Baumgarte(900.0, 900.0), output_step=0.05),
     ),
     Case(lambda: run(pushed(1e300)), p(run, pushed(1.0))),
+    Case(p(shaken, 1e7), p(shaken, 10.0)),
+    Case(p(shaken, 4e4), p(shaken, 4e4, 1e-6)),
     Case(
         lambda: run(replace(HINGED, loads=(Load("push", "bar.b", force=(0, formula("sqrt(t - 1)"), 0)),))),
         p(run, replace(HINGED, loads=(Load("push", "bar.b", force=(0, formula("sqrt(t + 1)"), 0)),))),

@@ -171,14 +171,23 @@ def test_the_accuracy_is_kept_for_no_more_steps_than_without_a_break(kind, metho
     assert result.attributes["step"] >= 1e-3
 
 
-@pytest.mark.parametrize("kind", ["load", "servo"])
 @pytest.mark.parametrize("at", AT)
 @pytest.mark.parametrize("method", [ROS2(2.5e-3), ROS3(5e-3), RK4(5e-3), GeneralisedAlpha(2.5e-3)], ids=repr)
-def test_a_break_that_nobody_tells_is_found_and_its_error_told(method, at, kind):
-    broken = (lambda t: (float(t >= at), 0, 0)) if kind == "load" else lambda t: (max(0.0, t - at), float(t >= at), 0)
-    error, told, result = off(shaken(kind, user(broken), at), method, check=True)
+def test_a_kink_that_nobody_tells_is_found_and_its_error_told(method, at):
+    target = user(lambda t: (max(0.0, t - at), float(t >= at), 0))
+    error, told, result = off(shaken("servo", target, at), method, check=True)
     assert told >= 0.3 * error
     assert any(f"jumps or has a kink at t = {at:.6g}" in note for note in result.attributes["notes"])
+
+
+@pytest.mark.parametrize("at", AT)
+@pytest.mark.parametrize("method", [ROS2(2.5e-3), ROS3(5e-3), RK4(5e-3), GeneralisedAlpha(2.5e-3)], ids=repr)
+def test_steps_end_at_a_jump_that_nobody_tells(method, at):
+    of = shaken("load", user(lambda t: (float(t >= at), 0, 0)), at)
+    error, told, _ = off(of, method, check=True)
+    with_breaks = shaken("load", user(lambda t: (float(t >= at), 0, 0), breaks=[at]), at)
+    assert error == pytest.approx(off(with_breaks, method, check=True)[0], rel=0.01, abs=1e-8)
+    assert 0.3 * error <= told <= 5 * error
 
 
 def test_a_formula_that_turns_back_at_the_end_of_a_range_is_told():

@@ -1,0 +1,172 @@
+"""Scenes whose steps are divided where their functions of time change faster (`ffr_dyn.functions.fast_changes`)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+from math import ceil
+
+import numpy as np
+
+from ffr_dyn.compile.alignment import in_one_piece
+from ffr_dyn.compile.force_tables import Callback
+from ffr_dyn.compile.scene_tables import System, of_time
+from ffr_dyn.functions.breaks import begins
+from ffr_dyn.functions.fast_changes import Changes, Made, divisions, fast_changes, made_of, slow
+from ffr_dyn.functions.time_functions import USER
+from ffr_dyn.kernels.functions import sample_functions
+from ffr_dyn.kernels.tables import SINCE, UNTIL
+from ffr_prep.common.arrays import Array
+from ffr_prep.common.errors import ComputationError
+
+PARTS = 4  # of a span over which a function is a cubic, for the step that is asked for
+CALLS = 8  # of a Python function in a step, about, before a run,
+FEWEST_CALLS, MOST_CALLS = 4_000, 100_000  # and in all, and again as many where it changes fast
+ASIDE = 1e-5  # of a step, at which it is called for its rate
+MOST_ROWS = 100_000  # times from which the search begins
+MOST = 1_000_000  # parts of steps
+BESIDE = 1e-9  # of a step, by which its parts are longer
+NAMES, TIMES = 3, 3  # in a text
+
+
+@dataclass(frozen=True)
+class Fast:
+    """What functions of time do within steps of a length [s].
+
+    spans : (L, 2) in order and shorter than a step;  purposes : what the functions that change there are for
+    jumps : (J, 2) the last time before something jumps that nobody has told, and the first behind it
+    switches : (S,) when operations of formulas switch
+    """
+
+    spans: Array
+    purposes: tuple[str, ...]
+    jumps: Array
+    switches: Array
+    step: float
+
+    @property
+    def moments(self) -> Array:
+        """(K,) at which powers may change between rows."""
+        return np.concatenate([self.spans[:, 0], self.jumps[:, 1], self.switches])
+
+    @property
+    def words(self) -> tuple[str, ...]:
+        """What is done about the spans."""
+        if not len(self.spans):
+            return ()
+        names = ", ".join(self.purposes[:NAMES]) + ", ..." * (len(self.purposes) > NAMES)
+        apart = np.flatnonzero(np.diff(self.spans[:, 0]) > self.step)
+        begun = self.spans[np.concatenate([[0], apart + 1]), 0]
+        times = ", ".join(f"{t:.6g}" for t in begun[:TIMES]) + ", ..." * (len(begun) > TIMES)
+        shortest = float((self.spans[:, 1] - self.spans[:, 0]).min())
+        return (
+            f"{names}: changes within {shortest:.2g} s, faster than a step of {self.step:.3g} s, from t = {times} s on; "
+            "steps are divided there",
+        )
+
+
+def fast_of(system: System, start: float, end: float, output_step: float, step: float) -> Fast | None:
+    """What functions of time do within steps [s] from `start` to `end`; None where they do nothing there.
+
+    A Python function that changes all the time, as noise does, is left as it is called.
+    Raises ComputationError where functions that are written change many times in every step.
+    """
+    functions = system.model.functions
+    made = made_of(functions.kind, functions.start, functions.data, system.model.rows.function, functions.switches)
+    if slow(made, functions.kind, functions.start, step):
+        return None
+    rows = np.linspace(start, end, 1 + min(MOST_ROWS, round((end - start) / output_step)))
+    found = _with_python(system, made, rows, step) if (functions.kind == USER).any() else None
+    if found is None:
+        found = fast_changes(made, partial(_sampled, system, partial(_no_python, system)), rows, functions.breaks, step)
+    if found is None:
+        raise ComputationError(
+            f"{', '.join(dict.fromkeys(system.purposes))}: a function of time changes so often that steps of {step:.3g} s "
+            "cannot be divided as it asks for; take a shorter step, or leave out of it what is too fast to matter"
+        )
+    names = dict.fromkeys(name for name, fast in zip(system.purposes, found.which, strict=True) if fast)
+    changes = len(found.spans) + len(found.jumps) + len(found.switches)
+    return Fast(found.spans, tuple(names), found.jumps, found.switches, step) if changes else None
+
+
+def _with_python(system: System, made: Made, rows: Array, step: float) -> Changes | None:
+    """With the Python functions looked into as often as a run would call them; None where that cannot be done: the run
+    tells what they raise, and when."""
+    calls = np.clip((rows[-1] - rows[0]) / step * CALLS, FEWEST_CALLS, MOST_CALLS)
+    looked = np.union1d(made.rows, np.linspace(rows[0], rows[-1], int(calls) + 1))
+    python = _Python(system, (float(rows[0]), float(rows[-1])), ASIDE * step)
+    try:
+        sample = partial(_sampled, system, python.numbers)
+        return fast_changes(replace(made, rows=looked), sample, rows, system.model.functions.breaks, step, int(calls))
+    except Exception:
+        return None
+
+
+class _Python:
+    """What the Python functions of time of a scene return, each called once for a time; rates that they do not return are
+    differences, by calls `aside` [s], or less where a break is told between."""
+
+    def __init__(self, system: System, span: tuple[float, float], aside: float) -> None:
+        breaks = system.model.functions.breaks
+        self.count, self.aside = system.user.count, aside
+        self.callbacks = [callback for callback in system.user.callbacks if not callback.with_state]
+        self.known: dict[tuple[int, float], Array] = {}
+        self.least = np.concatenate([span[:1], breaks[:, SINCE]])
+        self.most = np.concatenate([breaks[:, UNTIL], span[1:]])
+
+    def numbers(self, times: Array) -> Array:
+        """(T, U) for `ffr_dyn.kernels.functions.evaluate_functions`."""
+        found = np.zeros((times.size, self.count))
+        for callback in self.callbacks:
+            found[:, callback.slot : callback.slot + callback.size] = [self._of(callback, t) for t in times.tolist()]
+        return found
+
+    def _of(self, callback: Callback, t: float) -> Array:
+        key = callback.slot, t
+        if key not in self.known:
+            self.known[key] = values = of_time(callback, t)
+            if np.isnan(values[1]):
+                values[1] = self._rate(callback, t, float(values[0]))
+        return self.known[key]
+
+    def _rate(self, callback: Callback, t: float, value: float) -> float:
+        """The smaller of those before and behind, which is none of a jump that is near."""
+        before = self.least[max(int(np.searchsorted(self.least, t, side="right")) - 1, 0)]
+        behind = self.most[min(int(np.searchsorted(self.most, t)), self.most.size - 1)]
+        beside = (max(t - self.aside, float(before)), min(t + self.aside, float(behind)))
+        rates = [(float(of_time(callback, s)[0]) - value) / (s - t) for s in beside if s != t]
+        least, most = min(rates, default=0.0), max(rates, default=0.0)
+        return max(least, 0.0) + min(most, 0.0)
+
+
+def _no_python(system: System, times: Array) -> Array:
+    return np.zeros((times.size, system.user.count))
+
+
+def _sampled(system: System, python: Callable[[Array], Array], times: Array) -> Array:
+    """(T, F, 3) of all functions of time."""
+    seen = np.zeros((times.size, system.model.functions.kind.size, 3))
+    sample_functions(system.model.functions, python(times), times, seen)
+    return seen
+
+
+def divided(system: System, fast: Fast, step: float) -> System:
+    """The system, of which steps [s] end where functions that are fast ask for it: in proportion to the step."""
+    if not len(fast.spans) + len(fast.jumps):
+        return system
+    times = divisions(fast.spans, parts := ceil(PARTS * fast.step / step))
+    if times.size > MOST:
+        raise ComputationError(
+            f"{', '.join(fast.purposes)}: changes so often that {times.size:.2g} parts of steps, {parts} to a change, are "
+            "more than a run has room for; take a shorter step, or leave out what is too fast to matter"
+        )
+    functions = system.model.functions
+    jumps = np.column_stack([fast.jumps, fast.jumps[:, 1]])
+    sharp = np.concatenate([functions.breaks, jumps])
+    since = np.sort(sharp[:, SINCE])
+    near = np.searchsorted(since, times - BESIDE * step) < np.searchsorted(since, times + BESIDE * step)
+    breaks = np.concatenate([sharp, np.reshape([begins(t) for t in times[~near].tolist()], (-1, 3))])
+    functions = functions._replace(breaks=breaks[np.argsort(breaks[:, SINCE], kind="stable")])
+    piece = in_one_piece(system.model._replace(functions=functions))
+    return replace(system, model=piece.tables, words=piece.words)
