@@ -31,7 +31,14 @@ SHELL = set("|&;<>$`")  # what is for a shell to understand
 PAGES = sorted(
     path for room in ("tutorials", "howto") for path in (ROOT / "docs" / room).glob("*.md") if path.stem != "index"
 )
-SLOW = ()  # stems of pages that run for more than some fifteen seconds
+# Beginnings of commands that take long, and whose files nothing after them on the page reads.
+SLOW = (
+    "ffr-prep modes",
+    "ffr-dyn response",
+    "ffr-dyn run bearings.toml",
+    "ffr-dyn chart",
+    "ffr-dyn sweep tolerances.toml",
+)
 NUMBER = r"(?<![\w.])[-+]?\d+(?:\.\d*)?(?:e[-+]?\d+)?"
 DIGITS = r"([-+]?\d+(?:\.\d*)?(?:e[-+]?\d+)?)"
 
@@ -127,23 +134,26 @@ def typed(command: str, shown: list[str]) -> None:
     assert_shown(output, shown)
 
 
-@pytest.mark.parametrize(
-    "page", [pytest.param(page, marks=[pytest.mark.slow] * (page.stem in SLOW), id=page.stem) for page in PAGES]
-)
-def test_the_page(page, tmp_path, monkeypatch):
+def has_slow_commands(page: Path) -> bool:
+    texts = [text for language, text in blocks(page) if language == "console"]
+    return any(command.startswith(SLOW) for text in texts for command, _ in commands(text))
+
+
+def play(page: Path, folder: Path, without: tuple[str, ...] = ()) -> None:
+    """Do in a folder what a page says, but for commands that begin so."""
     for package in " ".join(re.findall(r"<!-- needs (.+?) -->", page.read_text(encoding="utf-8"))).split():
         pytest.importorskip(package)
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "meshes").symlink_to(ROOT / "meshes")
-    shutil.copy(REFERENCE / "plate.step", tmp_path)
+    (folder / "meshes").symlink_to(ROOT / "meshes")
+    shutil.copy(REFERENCE / "plate.step", folder)
     space, printed = {"__name__": page.stem}, ""
     for block in blocks(page):
         language, text = block
         if file_name(block):
-            (tmp_path / file_name(block)).write_text(text, encoding="utf-8")
+            (folder / file_name(block)).write_text(text, encoding="utf-8")
         elif language == "console":
             for command, shown in commands(text):
-                typed(command, shown)
+                if not command.startswith(without):
+                    typed(command, shown)
         elif language == "python":
             with contextlib.redirect_stdout(io.StringIO()) as out:
                 exec(compile(text, str(page), "exec"), space)
@@ -151,3 +161,16 @@ def test_the_page(page, tmp_path, monkeypatch):
         elif language == "text":
             assert_shown(printed, text.splitlines())
     plt.close("all")
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_the_page(page, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    play(page, tmp_path, without=SLOW)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("page", [page for page in PAGES if has_slow_commands(page)], ids=lambda page: page.stem)
+def test_the_whole_page(page, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    play(page, tmp_path)

@@ -74,9 +74,11 @@ def test_a_stopped_run_keeps_what_it_has_and_goes_on(scene, tmp_path, name):
         time.sleep(0.02)
     time.sleep(0.4)
     if name == "SIGTERM":
+        run.send_signal(signal.SIGSTOP)  # until the other one has looked: all that it computes is computed again below
         second = start(scene, output)
         assert "being written by another run" in second.communicate()[1]
         assert second.returncode == 2
+        run.send_signal(signal.SIGCONT)
     run.send_signal(getattr(signal, name))
     said = run.communicate()[1]
     assert run.returncode == 1
