@@ -53,6 +53,7 @@ def beam(parts: int | None, modes: int = 8, *, stiffening: bool = False) -> Flex
     return reduce(model, Request(name="b", reference=FixedTo("root"), **kept))
 
 
+@cache
 def bar(parts: int | None) -> FlexibleBody:
     """One metre along x, 60 mm by 40 mm, of solids."""
     mesh = box_mesh("hex20", (1.0, 0.06, 0.04), (8, 1, 1))
@@ -179,24 +180,21 @@ def test_stress_and_section_forces_are_those_of_the_whole():
 # ---- forces on surfaces -------------------------------------------------------------------------------------------
 
 
-BARS = {count: bar(count) for count in (None, 2, 4)}
-
-
 @pytest.mark.parametrize(
     "force",
     [
-        Pressure("load", "beam", 100.0),
-        Pressure("load", "beam", 100.0, triangles=lambda centres: centres[:, 2] > 0.0399),
-        Pressure("load", "beam", np.linspace(0, 100.0, len(BARS[None].surface.points)), triangles=np.arange(20)),
-        NodalForces("load", "beam", np.arange(40), np.full((40, 3), 0.1)),
+        lambda: Pressure("load", "beam", 100.0),
+        lambda: Pressure("load", "beam", 100.0, triangles=lambda centres: centres[:, 2] > 0.0399),
+        lambda: Pressure("load", "beam", np.linspace(0, 100, len(bar(None).surface.points)), triangles=np.arange(20)),
+        lambda: NodalForces("load", "beam", np.arange(40), np.full((40, 3), 0.1)),
     ],
     ids=["all", "above", "some", "nodes"],
 )
 def test_loads_on_the_surface_of_a_whole_act_on_its_parts(force):
-    one, several = (static(clamped(BARS[n], forces=(force,))) for n in (None, 4))
+    one, several = (static(clamped(bar(n), forces=(force(),))) for n in (None, 4))
     for name in ("clamp.force", "clamp.moment"):
         np.testing.assert_allclose(several[name], one[name], atol=1e-3)
-    tips = [result["beam.tip.position"][-1] - BARS[None].interface("tip").position for result in (one, several)]
+    tips = [result["beam.tip.position"][-1] - bar(None).interface("tip").position for result in (one, several)]
     np.testing.assert_allclose(tips[1], tips[0], atol=1e-3 * np.abs(tips[0]).max() + 1e-12)
 
 
@@ -209,7 +207,7 @@ def run(model: FlexibleBody) -> Result:
 
 
 def test_a_result_speaks_of_one_body(tmp_path):
-    one, two = run(BARS[None]), load_result(save_result(run(BARS[2]), tmp_path / "run.nc"))
+    one, two = run(bar(None)), load_result(save_result(run(bar(2)), tmp_path / "run.nc"))
     assert two.attributes["parts"] == {"beam": ["beam_1", "beam_2"]}
     assert "beam.tip.position" in two.quantities
     spots = [hot_spots(result, count=1)[0] for result in (one, two)]
@@ -227,7 +225,7 @@ def test_beam_elements_of_parts_are_numbered_through():
 
 def test_pictures_join():
     """At any scale: the points that two parts share are drawn at one place, but for the square of the elastic rotation."""
-    two, one = (film(run(BARS[n]), 4, scale=5.0) for n in (2, None))
+    two, one = (film(run(bar(n)), 4, scale=5.0) for n in (2, None))
     (solid,), (whole,) = two.solids, one.solids
     points = drawn_points(solid, 3, two.scale)
     _, first, again = np.unique(solid.surface.points.round(9), axis=0, return_index=True, return_inverse=True)
