@@ -26,10 +26,11 @@ import shutil
 import subprocess
 import sys
 import time
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Iterator, Sequence
+from typing import Iterator, Mapping, Sequence
 
 HOME = Path(__file__).resolve().parent
 OLDEST = (3, 11)
@@ -49,7 +50,23 @@ LIBRARIES = {
 }
 BROWSERS = ("chromium", "google-chrome", "chrome")
 
-CHECKS = {"ruff check": ("ruff", "check"), "ruff format": ("ruff", "format", "--check"), "mypy": ("mypy",)}
+# Done together, since mypy takes one core for as long as all others. What is compiled here is found by the examples of the
+# site and by the tests, which run side by side and would each compile the same.
+CHECKS = {
+    "ruff check": ("ruff", "check"),
+    "ruff format": ("ruff", "format", "--check"),
+    "mypy": ("mypy",),
+    "kernels": (
+        "python",
+        "-c",
+        "from ffr_dyn.compile.first_use import FORCES, ensure_compiled; from ffr_dyn.integrators import methods;"
+        "ensure_compiled(*methods().values(), forces=FORCES)",
+    ),
+    "solvers": (
+        *("ffr-prep", "reduce", "meshes/box.geo", "--material", "steel", "--interface", "left", "--interface", "right"),
+        *("-o", "build/box.ffr"),
+    ),
+}
 SITE = Path("build") / "site"
 LINES_OF_AN_ERROR = 15
 SIGNS_OF_NO_NETWORK = (
@@ -152,12 +169,14 @@ def _pages(builder: str) -> list[str]:
 
 def test(*, slow: bool) -> int:
     """Every check, and the tests last: their closing line ends the output."""
-    passed = [*(check(title, command) for title, command in CHECKS.items()), build_pages()]
+    passed = [check_together(CHECKS), build_pages()]
     selection = ["-m", ""] if slow else []
     print("pytest", flush=True)
     # A process on every core, each of which does whole files, with one thread: together they would wait for each other.
-    command = [str(_program("python")), "-m", "pytest", "-n", "auto", "--dist", "loadfile", *selection]
-    tests = subprocess.run(command, cwd=HOME, env={**os.environ, "OMP_NUM_THREADS": "1"})
+    # In the order of the folders: by their number of tests, long ones would come last, and one core would wait.
+    how = ["-n", "auto", "--dist", "loadfile", "--no-loadscope-reorder"]
+    command = [str(_program("python")), "-m", "pytest", *how, *selection]
+    tests = subprocess.run(command, cwd=HOME, env={**environment(), "OMP_NUM_THREADS": "1"})
     if tests.returncode < 0:
         print(f"\npytest was ended by signal {-tests.returncode}: its tests are not complete.", flush=True)
     return 0 if all(passed) and tests.returncode == 0 else 1
@@ -165,11 +184,17 @@ def test(*, slow: bool) -> int:
 
 def check(title: str, command: Sequence[str]) -> bool:
     """Run one check; its output is shown only if it finds something."""
-    with timed(title):
-        done = captured([str(_program(command[0])), *command[1:]])
-    if done.returncode:
-        print(f"{title} FAILED\n{done.stdout}", flush=True)
-    return done.returncode == 0
+    return check_together({title: command})
+
+
+def check_together(commands: Mapping[str, Sequence[str]]) -> bool:
+    """Run checks side by side; whether all have passed."""
+    with timed(", ".join(commands)), ThreadPoolExecutor(len(commands)) as at_once:
+        done = list(at_once.map(lambda command: captured([str(_program(command[0])), *command[1:]]), commands.values()))
+    for title, one in zip(commands, done):
+        if one.returncode:
+            print(f"{title} FAILED\n{one.stdout}", flush=True)
+    return not any(one.returncode for one in done)
 
 
 def _program(name: str) -> Path:
@@ -347,12 +372,18 @@ def captured(command: Sequence[str]) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
         command,
         cwd=HOME,
+        env=environment(),
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         encoding="utf-8",
         errors="replace",
     )
+
+
+def environment() -> dict[str, str]:
+    """Of what runs here. Modules stay compiled on disk: the tests start hundreds of processes that load the same ones."""
+    return {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
 
 
 @contextmanager

@@ -61,7 +61,7 @@ def test_it_runs_before_anything_is_installed():
     imported = [node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)]
     imported += [alias.name for node in ast.walk(tree) if isinstance(node, ast.Import) for alias in node.names]
     assert len(imported) > 5
-    assert set(imported) <= set(sys.stdlib_module_names)
+    assert {name.partition(".")[0] for name in imported} <= set(sys.stdlib_module_names)
 
 
 def test_help_names_both_commands():
@@ -290,9 +290,16 @@ def test_an_environment_that_cannot_be_made_says_so(machine):
 
 def test_the_tests_come_last(machine):
     assert bootstrap.test(slow=False) == 0
-    assert [Path(command[0]).name for command in machine.commands] == ["ruff", "ruff", "mypy", "python", "python"]
-    assert machine.commands[-2][1:3] == ["-m", "sphinx"]
-    assert machine.commands[-1][1:] == ["-m", "pytest", "-n", "auto", "--dist", "loadfile"]
+    first, (site, tests) = machine.commands[:-2], machine.commands[-2:]
+    assert sorted(Path(command[0]).name for command in first) == ["ffr-prep", "mypy", "python", "ruff", "ruff"]
+    assert site[1:3] == ["-m", "sphinx"]
+    assert tests[1:] == ["-m", "pytest", "-n", "auto", "--dist", "loadfile", "--no-loadscope-reorder"]
+
+
+def test_what_runs_leaves_its_modules_compiled(monkeypatch):
+    monkeypatch.setenv("PYTHONDONTWRITEBYTECODE", "1")
+    asked = bootstrap.captured([sys.executable, "-c", "import sys; print(sys.dont_write_bytecode)"])
+    assert asked.stdout.strip() == "False"
 
 
 def test_slow_selects_every_test(machine):
@@ -324,7 +331,7 @@ def test_a_site_with_a_warning_fails(machine):
     assert bootstrap.main(["site"]) == 1
 
 
-@pytest.mark.parametrize("word", ["check", "format", "sphinx", "pytest"])
+@pytest.mark.parametrize("word", ["check", "format", "reduce", "sphinx", "pytest"])
 def test_any_failed_check_fails(machine, word):
     machine.bad = {word}
     assert bootstrap.test(slow=False) == 1

@@ -41,6 +41,7 @@ def test_how_far_a_whirl_is_from_the_speed_is_smooth_where_it_stands_still():
     np.testing.assert_allclose(found, critical - beside, atol=1e-3)
 
 
+@pytest.mark.slow  # with a disc on a massless shaft below
 def test_critical_speeds_do_not_depend_on_the_list_of_speeds():
     found = [fd.campbell(rotor(), speeds=np.linspace(*speeds), modes=2) for speeds in ((0, 800, 21), (100, 300, 3))]
     one, other = ({of["mode"]: of["speed"] for of in result.attributes["critical"]} for result in found)

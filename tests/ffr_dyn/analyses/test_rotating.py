@@ -92,8 +92,8 @@ def test_what_only_decays_is_no_slow_vibration():
     found = fd.campbell(scene, speeds=(5.0, 26.0, 47.0), modes=2)
     assert all(name.startswith("disc shift") for name in found.attributes["names"])
     assert {name.split(", ")[1] for name in found.attributes["names"]} == {"forward", "backward"}
-    for modes in (1, 2):
-        (limit,) = fd.campbell(scene, speeds=(5.0, 26.0, 47.0), modes=modes).attributes["limits"]
+    for of in (found, fd.campbell(scene, speeds=(5.0, 26.0, 47.0), modes=1)):
+        (limit,) = of.attributes["limits"]
         assert limit["speed"] == pytest.approx(30.0, rel=1e-8)
 
 
@@ -293,9 +293,11 @@ def test_the_rms_of_noise_is_that_of_a_long_run_within_its_confidence_interval()
     half = 1.96 * np.sqrt(variance) / (2 * rms**2)
     f, random = np.arange(low, high, 1 / T), np.random.default_rng(5)
     a, b = random.normal(scale=np.sqrt(level / T), size=(2, f.size))
-    t = np.arange(0.0, T + 20.1, 0.02)
-    angle = 2 * np.pi * f * t[:, None]
-    push = fd.Load("push", "m.c", force=(fd.recorded(t, np.cos(angle) @ a + np.sin(angle) @ b), 0, 0))
+    t, period = np.arange(0.0, T + 20.1, 0.02), round(T / 0.02)  # the frequencies are multiples of 1 / T
+    amplitudes = np.zeros(period // 2 + 1, complex)
+    amplitudes[np.rint(f * T).astype(int)] = period / 2 * (a - 1j * b)
+    noise = np.resize(np.fft.irfft(amplitudes, period), t.size)  # which repeats itself
+    push = fd.Load("push", "m.c", force=(fd.recorded(t, noise), 0, 0))
     run = fd.forward(replace(scene, loads=(push,)), end=T + 20, output_step=0.02, method=fd.RK4(0.01), check=False)
     assert half < 0.06
     assert abs(np.sqrt(np.mean(run["rail.stroke"][run.time > 20.0] ** 2)) / rms - 1) < half

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -71,6 +72,7 @@ LOADS = (
 )
 
 
+@cache
 def cases() -> dict[str, Scene]:
     """A scene of everything there is to a scene; all in states at random, far off their joints."""
     found = {kind: chain(kind=kind, **FRAMES) for kind in KINDS}

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from places import ROOT
 
+from ffr_dyn.cli import main
 from ffr_dyn.compile.first_use import ensure_compiled
 from ffr_dyn.integrators import ROS2
 from ffr_dyn.results.file import load_result
@@ -53,13 +54,14 @@ def start(scene, output, *options, limit: int | None = None) -> subprocess.Popen
     return subprocess.Popen(command, cwd=ROOT, stderr=subprocess.PIPE, text=True, preexec_fn=limited)
 
 
-def assert_goes_on(scene, path):
-    """The rest of a stopped run, against a run that was never stopped."""
+def assert_goes_on(scene, path, monkeypatch):
+    """The rest of a stopped run, against a run that was never stopped: both in this process, which starts at once."""
     stopped = load_result(path)
     end = f"{stopped.time[-1] + 0.1:.6g}"
     whole = path.with_name("whole.nc")
     for output, options in ((path, ["--resume"]), (whole, [])):
-        assert start(scene, output, "--end", end, *options).wait() == 0
+        monkeypatch.setattr(sys, "argv", ["ffr-dyn", "run", str(scene), "-o", str(output), "--end", end, *options])
+        main()
     there, here = load_result(path), load_result(whole)
     np.testing.assert_array_equal(there.time, here.time)
     for name in here.quantities:
@@ -67,16 +69,18 @@ def assert_goes_on(scene, path):
 
 
 @pytest.mark.parametrize("name", ["SIGTERM", "SIGHUP", "SIGINT"])
-def test_a_stopped_run_keeps_what_it_has_and_goes_on(scene, tmp_path, name):
+def test_a_stopped_run_keeps_what_it_has_and_goes_on(scene, tmp_path, monkeypatch, name):
     output = tmp_path / "x.nc"
     run = start(scene, output)
     while not (tmp_path / "x.nc.part").exists() or not (tmp_path / "x.nc.part").stat().st_size:
         time.sleep(0.02)
     time.sleep(0.4)
     if name == "SIGTERM":
+        run.send_signal(signal.SIGSTOP)  # until the other one has looked: all that it computes is computed again below
         second = start(scene, output)
         assert "being written by another run" in second.communicate()[1]
         assert second.returncode == 2
+        run.send_signal(signal.SIGCONT)
     run.send_signal(getattr(signal, name))
     said = run.communicate()[1]
     assert run.returncode == 1
@@ -86,11 +90,11 @@ def test_a_stopped_run_keeps_what_it_has_and_goes_on(scene, tmp_path, name):
     assert stopped.attributes["status"] == f"stopped: {name}"
     assert sorted(os.listdir(tmp_path)) == ["scene.toml", "x.nc"]
     if name == "SIGTERM":
-        assert_goes_on(scene, output)
+        assert_goes_on(scene, output, monkeypatch)
 
 
 @pytest.mark.parametrize(("limit", "kept"), [(100_000, False), (1_000_000, True)])
-def test_a_full_disk_ends_a_run_in_order(scene, tmp_path, limit, kept):
+def test_a_full_disk_ends_a_run_in_order(scene, tmp_path, monkeypatch, limit, kept):
     output = tmp_path / "x.nc"
     run = start(scene, output, limit=limit)
     said = run.communicate()[1]
@@ -101,4 +105,4 @@ def test_a_full_disk_ends_a_run_in_order(scene, tmp_path, limit, kept):
     assert not list(tmp_path.glob("*.part"))
     if kept:
         assert load_result(output).time.size > 10
-        assert_goes_on(scene, output)
+        assert_goes_on(scene, output, monkeypatch)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -42,6 +43,7 @@ CLAMP = Joint("clamp", "fixed", "ground.wall", "beam.root")
 HALF = (0.5, 0.0, 0.0)
 
 
+@cache
 def beam(parts: int | None, modes: int = 8, *, stiffening: bool = False) -> FlexibleBody:
     """One metre along x, 10 mm by 20 mm."""
     member = Member(rectangle(0.02, 0.01), STEEL, (0.0, 1.0, 0.0))
@@ -51,6 +53,7 @@ def beam(parts: int | None, modes: int = 8, *, stiffening: bool = False) -> Flex
     return reduce(model, Request(name="b", reference=FixedTo("root"), **kept))
 
 
+@cache
 def bar(parts: int | None) -> FlexibleBody:
     """One metre along x, 60 mm by 40 mm, of solids."""
     mesh = box_mesh("hex20", (1.0, 0.06, 0.04), (8, 1, 1))
@@ -69,15 +72,15 @@ def pushed(model: FlexibleBody, **more: object) -> Scene:
     return clamped(model, loads=(Load("push", "beam.tip", force=(0.0, 1.0, 0.5)),), **more)
 
 
-BEAMS = {count: beam(count) for count in (None, 2, 4)}
-WHOLE = pushed(BEAMS[None])
+def whole() -> Scene:
+    return pushed(beam(None))
 
 
 # ---- the scene ----------------------------------------------------------------------------------------------------
 
 
 def test_parts_take_the_place_of_their_whole():
-    scene = pushed(BEAMS[4])
+    scene = pushed(beam(4))
     assert [body.name for body in scene.bodies] == ["beam_1", "beam_2", "beam_3", "beam_4"]
     assert [joint.name for joint in scene.joints] == ["clamp", "beam_cut_1", "beam_cut_2", "beam_cut_3"]
     assert replace(scene, name="again").bodies == scene.bodies
@@ -89,7 +92,7 @@ def test_pose_and_motion_of_the_whole_are_those_of_its_parts():
     motion = {"position": (1, 2, 3), "rotation": (0, 0, 0.5), "velocity": (3, 0, 1), "omega_bar": (1, -2, 0.5)}
     results = [
         integrate(
-            Scene((Body("beam", BEAMS[count], damping=0.02, **motion),)), end=0.05, output_step=0.05, method=ROS2(1e-4)
+            Scene((Body("beam", beam(count), damping=0.02, **motion),)), end=0.05, output_step=0.05, method=ROS2(1e-4)
         )
         for count in (None, 4)
     ]
@@ -101,8 +104,8 @@ def test_pose_and_motion_of_the_whole_are_those_of_its_parts():
 @pytest.mark.parametrize(
     ("body", "words"),
     [
-        (lambda: Body("beam", BEAMS[2], q=np.ones(14)), "start undeformed; leave out q"),
-        (lambda: Body("beam", BEAMS[2], damping=np.arange(14.0)), "give one damping ratio for all"),
+        (lambda: Body("beam", beam(2), q=np.ones(14)), "start undeformed; leave out q"),
+        (lambda: Body("beam", beam(2), damping=np.arange(14.0)), "give one damping ratio for all"),
     ],
 )
 def test_what_parts_cannot_take_from_the_whole(body, words):
@@ -112,9 +115,9 @@ def test_what_parts_cannot_take_from_the_whole(body, words):
 
 def test_what_needs_a_part_says_so():
     with pytest.raises(InputError, match="body 'beam' is in parts; name one: beam_1, beam_2"):
-        clamped(BEAMS[2], forces=(ModalForce("f", "beam", np.ones(14)),))
+        clamped(beam(2), forces=(ModalForce("f", "beam", np.ones(14)),))
     with pytest.raises(InputError, match=r"body 'beam' has no interface 'top'.*'tip'"):
-        clamped(BEAMS[2], loads=(Load("push", "beam.top", force=(0, 1, 0)),))
+        clamped(beam(2), loads=(Load("push", "beam.top", force=(0, 1, 0)),))
 
 
 # ---- mechanics ----------------------------------------------------------------------------------------------------
@@ -123,14 +126,14 @@ def test_what_needs_a_part_says_so():
 @pytest.mark.parametrize("count", [2, 4])
 def test_small_deflections_are_those_of_the_whole(count):
     """A parts' frame turns truly, so the tip comes in by 3/5 of the square of its deflection: 5e-7 of 1e-3."""
-    one, several = (static(scene)["beam.tip.position"][-1] for scene in (WHOLE, pushed(BEAMS[count])))
+    one, several = (static(scene)["beam.tip.position"][-1] for scene in (whole(), pushed(beam(count))))
     np.testing.assert_allclose(several, one, atol=1e-6)
     assert several[1] - 0 == pytest.approx(one[1], rel=1e-5)
 
 
 @pytest.mark.parametrize("count", [2, 4])
 def test_frequencies_are_those_of_the_whole(count):
-    one, several = (linearise(clamped(BEAMS[n])).frequencies for n in (None, count))
+    one, several = (linearise(clamped(beam(n))).frequencies for n in (None, count))
     np.testing.assert_allclose(np.sort(several)[:8], np.sort(one)[:8], rtol=1e-3)
 
 
@@ -169,7 +172,7 @@ def test_stress_and_section_forces_are_those_of_the_whole():
         StressMeasurement("stress", "beam", (0.3, 0, 0), what="stress"),
         SectionMeasurement("m", "beam", (0.7, 0, 0)),
     )
-    one, four = (static(pushed(BEAMS[n], measurements=sensors)) for n in (None, 4))
+    one, four = (static(pushed(beam(n), measurements=sensors)) for n in (None, 4))
     for name in ("measured.stress", "measured.m"):
         np.testing.assert_allclose(four[name], one[name], atol=2e-4 * np.abs(one[name]).max())
 
@@ -177,24 +180,21 @@ def test_stress_and_section_forces_are_those_of_the_whole():
 # ---- forces on surfaces -------------------------------------------------------------------------------------------
 
 
-BARS = {count: bar(count) for count in (None, 2, 4)}
-
-
 @pytest.mark.parametrize(
     "force",
     [
-        Pressure("load", "beam", 100.0),
-        Pressure("load", "beam", 100.0, triangles=lambda centres: centres[:, 2] > 0.0399),
-        Pressure("load", "beam", np.linspace(0, 100.0, len(BARS[None].surface.points)), triangles=np.arange(20)),
-        NodalForces("load", "beam", np.arange(40), np.full((40, 3), 0.1)),
+        lambda: Pressure("load", "beam", 100.0),
+        lambda: Pressure("load", "beam", 100.0, triangles=lambda centres: centres[:, 2] > 0.0399),
+        lambda: Pressure("load", "beam", np.linspace(0, 100, len(bar(None).surface.points)), triangles=np.arange(20)),
+        lambda: NodalForces("load", "beam", np.arange(40), np.full((40, 3), 0.1)),
     ],
     ids=["all", "above", "some", "nodes"],
 )
 def test_loads_on_the_surface_of_a_whole_act_on_its_parts(force):
-    one, several = (static(clamped(BARS[n], forces=(force,))) for n in (None, 4))
+    one, several = (static(clamped(bar(n), forces=(force(),))) for n in (None, 4))
     for name in ("clamp.force", "clamp.moment"):
         np.testing.assert_allclose(several[name], one[name], atol=1e-3)
-    tips = [result["beam.tip.position"][-1] - BARS[None].interface("tip").position for result in (one, several)]
+    tips = [result["beam.tip.position"][-1] - bar(None).interface("tip").position for result in (one, several)]
     np.testing.assert_allclose(tips[1], tips[0], atol=1e-3 * np.abs(tips[0]).max() + 1e-12)
 
 
@@ -207,7 +207,7 @@ def run(model: FlexibleBody) -> Result:
 
 
 def test_a_result_speaks_of_one_body(tmp_path):
-    one, two = run(BARS[None]), load_result(save_result(run(BARS[2]), tmp_path / "run.nc"))
+    one, two = run(bar(None)), load_result(save_result(run(bar(2)), tmp_path / "run.nc"))
     assert two.attributes["parts"] == {"beam": ["beam_1", "beam_2"]}
     assert "beam.tip.position" in two.quantities
     spots = [hot_spots(result, count=1)[0] for result in (one, two)]
@@ -217,7 +217,7 @@ def test_a_result_speaks_of_one_body(tmp_path):
 
 
 def test_beam_elements_of_parts_are_numbered_through():
-    one, four = (static(pushed(BEAMS[n])) for n in (None, 4))
+    one, four = (static(pushed(beam(n))) for n in (None, 4))
     for element in (0, 6, 15):
         expected = section_forces(one, "beam", element)
         np.testing.assert_allclose(section_forces(four, "beam", element), expected, atol=2e-3)
@@ -225,7 +225,7 @@ def test_beam_elements_of_parts_are_numbered_through():
 
 def test_pictures_join():
     """At any scale: the points that two parts share are drawn at one place, but for the square of the elastic rotation."""
-    two, one = (film(run(BARS[n]), 4, scale=5.0) for n in (2, None))
+    two, one = (film(run(bar(n)), 4, scale=5.0) for n in (2, None))
     (solid,), (whole,) = two.solids, one.solids
     points = drawn_points(solid, 3, two.scale)
     _, first, again = np.unique(solid.surface.points.round(9), axis=0, return_index=True, return_inverse=True)
@@ -239,24 +239,24 @@ def test_pictures_join():
 
 def test_a_scene_file_names_the_whole(tmp_path):
     settings = Settings(start=0.0, end=0.1, output_step=0.1, method=ROS2(1e-3))
-    path = save_scene(pushed(BEAMS[2]), settings, tmp_path / "beam.toml")
+    path = save_scene(pushed(beam(2)), settings, tmp_path / "beam.toml")
     assert "[bodies.beam]" in path.read_text()
     assert "cut" not in path.read_text()
     scene, _ = load_scene(path)
     assert [body.name for body in scene.bodies] == ["beam_1", "beam_2"]
-    np.testing.assert_array_equal(scene.bodies[1].model.PP_dm, BEAMS[2].parts[1].PP_dm)
+    np.testing.assert_array_equal(scene.bodies[1].model.PP_dm, beam(2).parts[1].PP_dm)
 
 
 def test_a_formula_knows_markers_of_the_whole_and_coordinates_of_the_parts(tmp_path):
     settings = Settings(start=0.0, end=0.1, output_step=0.1, method=ROS2(1e-3))
-    path = save_scene(clamped(BEAMS[2]), settings, tmp_path / "beam.toml")
+    path = save_scene(clamped(beam(2)), settings, tmp_path / "beam.toml")
     formula = '"-100 * beam.tip.position.y + beam_2.q[1]"'
     path.write_text(path.read_text() + f'\n[loads.spring]\nmarker = "beam.tip"\nforce = [0, {formula}, 0]\n')
     assert static(load_scene(path)[0])["beam.tip.position"][-1, 1] == pytest.approx(0.0, abs=1e-9)
 
 
 def test_deformed_parts_are_no_file(tmp_path):
-    scene = pushed(BEAMS[2])
+    scene = pushed(beam(2))
     settings = Settings(start=0.0, end=0.1, output_step=0.1, method=ROS2(1e-3))
     with pytest.raises(InputError, match="parts of body 'beam' differ in pose or treatment, or are deformed"):
         save_scene(scene_at(scene, static(scene)), settings, tmp_path / "beam.toml")
@@ -279,11 +279,11 @@ def test_a_result_tells_how_many_parts_would_do():
     assert "7 parts would do (ffr-prep reduce --parts)" in note
     assert parts_needed(scene, result) == {"beam": 7}
     assert parts_needed(scene, result, angle=0.05) == {"beam": 25}
-    small = static(WHOLE)
+    small = static(whole())
     assert small.attributes["notes"] == []
-    assert parts_needed(WHOLE, small) == {"beam": 1}
+    assert parts_needed(whole(), small) == {"beam": 1}
     with pytest.raises(InputError, match="must be positive"):
-        parts_needed(WHOLE, small, angle=0.0)
+        parts_needed(whole(), small, angle=0.0)
 
 
 def test_parts_know_better_where_a_body_bends():
@@ -298,7 +298,7 @@ def test_parts_know_better_where_a_body_bends():
 
 def test_a_bent_body_in_parts_stays_as_it_is_where_a_result_has_left_it():
     """The joints between its parts hold them as they are drawn, not as they are turned then: statics ends where it begins."""
-    still = clamped(BEAMS[2], loads=(Load("push", "beam.tip", force=(0.0, 50.0, 0.0)),))
+    still = clamped(beam(2), loads=(Load("push", "beam.tip", force=(0.0, 50.0, 0.0)),))
     bent = static(still)
     again = static(scene_at(still, bent))
     there = "beam.tip.position"
