@@ -48,6 +48,7 @@ from ffr_dyn.integrators import Integrator, Within, stepped
 from ffr_dyn.integrators.ros2 import Twin
 from ffr_dyn.integrators.stabilisation import Projection, Stabilisation
 from ffr_dyn.integrators.tolerances import tightened
+from ffr_dyn.linear.departure import departures, free_to_leave, places, pushed
 from ffr_dyn.linear.steady_state import steadily
 from ffr_dyn.results.file import load_result, with_attributes
 from ffr_dyn.results.result import Result
@@ -64,6 +65,8 @@ SURE = 2  # order that linearly implicit methods keep where elastic forces are s
 SLOW = 0.7  # a ringing output's error falls slower than the step to this power,
 IN_COMPANY = 1.4  # or to this one, if it is of vibration, where others ring
 SHOWN = 3  # times in a note
+WATCHED, FEW = 50, 2  # rows at least by which a disturbed run is held against the other, and steps to a row
+SHORTEST, LONGEST = 8, 64  # steps to a row, by which what it seems to show is looked at again
 QUICK = 1e7  # microseconds of the further runs, by `_cost`, up to which they are made unasked
 
 Beginning = Literal["as-given", "quasi-static", "steady", "periodic"]  # the default and the others
@@ -126,6 +129,13 @@ class _Runs:
     def vibrations(self) -> Vibrations:
         """Of the scene at its start."""
         return vibrations(self.assembled, self.start)
+
+    @cached_property
+    def free_to_leave(self) -> Assembled:
+        """The start in space where a plane was found for it, but for periodic motions, which take long to find."""
+        if self.begin == "periodic":
+            return self.assembled
+        return free_to_leave(self.scene, self.assembled, self.start, lambda one: begun(one, self.start, self.begin))
 
     @cached_property
     def untold(self) -> dict[str, list[float]]:
@@ -402,6 +412,7 @@ def _finished(runs: _Runs, trial: _Trial, path: str | Path | None, ringing: Set[
         *_unresolved(runs, trial, ringing),
         *_coarse(result),
         *_unstable(result, grown),
+        *(_left(runs, trial) if trial.errors and not grown else ()),
     ]
     trial = replace(trial, errors={name: _by_chance(e, grown.get(name, 0.0)) for name, e in trial.errors.items()})
     told = {name: [e.error, e.of_range] for name, e in trial.errors.items()}
@@ -491,6 +502,43 @@ def _unstable(result: Result, grown: Mapping[str, float]) -> list[str]:
         f"{name} grows from rounding to {far}{also}: the motion is unstable, and how far it has gone by then is chance; give "
         "it the imperfection that is meant, such as a small load or deflection"
     ]
+
+
+def _left(runs: _Runs, trial: _Trial) -> list[str]:
+    """A note where a disturbed motion leaves that of the run, by more steps of its own if it seems to by few."""
+    fine = max(1, math.ceil(WATCHED * runs.output_step / (runs.how["end"] - runs.start) - 1e-9))
+    again = int(np.clip(math.ceil(trial.count / fine), SHORTEST, LONGEST))
+    for steps in (FEW, again, LONGEST):
+        found = _departures(runs, trial.result, fine, steps)
+        if found is not None and (not found or steps > FEW):
+            break
+    if not found:
+        return []
+    name = max(found, key=lambda one: (one in trial.result.quantities, found[one]))
+    return [
+        f"the motion is unstable: a disturbance at the start grows to {found[name]:.1g} times its size by {name}, and the "
+        "run shows the motion without one; give it the imperfection that is meant, such as a small load or deflection"
+    ]
+
+
+def _departures(runs: _Runs, result: Result, fine: int, steps: int) -> dict[str, float] | None:
+    """What leaves the motion by a disturbance, seen by so many steps to rows that are so many times finer; None where such
+    runs fail."""
+    row, lasts = runs.output_step / fine, runs.how["end"] - runs.start
+    try:
+        still = runs.free_to_leave
+        states = still, pushed(still, runs.start, lasts)
+    except ComputationError:
+        return None
+    more = {"output_step": row, "outputs": places(still.system), "stopwatch": None}
+    calls = [
+        lambda say, one=one: replace(runs, assembled=one).run(Twin(row / steps), **more, progress=say) for one in states
+    ]
+    run, disturbed = runs.together(calls, leader=False)
+    if any(isinstance(one, InputError) or _failed(one) for one in (run, disturbed)):  # of steps that are rounding, too
+        return None
+    size = max(body.model.size for body in runs.scene.bodies) or 1.0
+    return departures(run, disturbed, size, float(result.time[-1]))
 
 
 def _by_chance(told: StepError, size: float) -> StepError:
