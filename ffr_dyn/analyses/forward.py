@@ -33,7 +33,9 @@ from ffr_dyn.consistency.step_error import (
     StepError,
     begins_alone,
     from_rounding,
+    larger,
     of_the_range,
+    order_shown,
     percent,
     step_errors,
     too_coarse,
@@ -136,6 +138,11 @@ class _Runs:
         if self.begin == "periodic":
             return self.assembled
         return free_to_leave(self.scene, self.assembled, self.start, lambda one: begun(one, self.start, self.begin))
+
+    @cached_property
+    def feels(self) -> bool:
+        """Whether Python functions of the state act, of which nobody tells where on the way they jump or have a kink."""
+        return any(callback.with_state for callback in self.assembled.system.user.callbacks)
 
     @cached_property
     def untold(self) -> dict[str, list[float]]:
@@ -325,8 +332,13 @@ def _told(runs: _Runs, trial: _Trial, other: Any, *longer: Any) -> _Trial:
     order = 1 if too_long else PARTLY_STIFF if share == 0.5 else trial.method.order
     if runs.untold:
         order = OVER_BREAKS if trial.method.order == 3 else 1
+    farther = _farther(runs, trial.method, trial.count) if runs.feels else None
+    if runs.feels:
+        order = min(order, order_shown(trial.result, other, farther, order))
     twins = (*trial.twins, *(twin for twin in longer if not _failed(twin)))
     errors = step_errors(trial.result, other, order, twins)
+    if farther is not None:
+        errors = larger(errors, step_errors(trial.result, farther, order))
     start = _start(runs, trial.method, trial.result, trial.twins[0]) if trial.twins else ()
     return replace(trial, twins=twins, errors=with_start(errors, trial.result, *start) if start else errors)
 
@@ -336,7 +348,7 @@ def _further(
 ) -> list[Callable[[Say], Beside | None]]:
     """The further runs that tell the error of a run beside its twin: one with another step, and, beside a twin of half the
     step, one with a longer step; those of the last trial if its step is not too far."""
-    far = 2 if runs.untold else _leap(method)
+    far = 2 if runs.untold or runs.feels else _leap(method)
     near = next((one for one in reversed(earlier) if one.twins and count <= far * one.count), None)
     if near is not None:
         ratio = count / near.count
@@ -354,12 +366,24 @@ def _other(runs: _Runs, method: Any, count: int, say: Say) -> Beside:
         finer = replace(method, tolerances=tightened(method.tolerances, 10))
         return Beside(runs.run(finer, progress=say, looks=2 * LOOKS), 10.0 ** (-1.0 / method.order))
     if method.implicit and count > 1:
-        fewer = -(-count // (4 if method.order > SURE and not runs.untold else 2))
+        fewer = -(-count // (4 if method.order > SURE and not (runs.untold or runs.feels) else 2))
         try:
             return Beside(runs.run(replace(method, step=runs.output_step / fewer), progress=say), count / fewer)
         except ComputationError:
             pass  # half the step is sure to run
     return Beside(runs.run(replace(method, step=runs.output_step / (2 * count)), progress=say), 0.5)
+
+
+def _farther(runs: _Runs, method: Any, count: int) -> Beside | None:
+    """The run with about four times the step, of explicit methods twice, that tells with `_other` what order it keeps; None
+    where a row is not so long, such steps fail, or the method chooses its own."""
+    fewer = -(-count // (4 if method.implicit else 2))
+    if not 1 <= fewer <= count // 2:
+        return None
+    try:
+        return Beside(runs.run(replace(method, step=runs.output_step / fewer)), count / fewer)
+    except (ComputationError, InputError):  # of an explicit step that is too long
+        return None
 
 
 def _share(method: Integrator) -> float | None:
