@@ -35,7 +35,9 @@ from ffr_dyn.consistency.step_error import (
     StepError,
     begins_alone,
     from_rounding,
+    larger,
     of_the_range,
+    order_shown,
     percent,
     step_errors,
     too_coarse,
@@ -50,6 +52,7 @@ from ffr_dyn.integrators import Integrator, Within, stepped
 from ffr_dyn.integrators.ros2 import Twin
 from ffr_dyn.integrators.stabilisation import Projection, Stabilisation
 from ffr_dyn.integrators.tolerances import tightened
+from ffr_dyn.linear.departure import departures, free_to_leave, places, pushed
 from ffr_dyn.linear.steady_state import steadily
 from ffr_dyn.results.file import load_result, with_attributes
 from ffr_dyn.results.result import Result
@@ -66,6 +69,8 @@ SURE = 2  # order that linearly implicit methods keep where elastic forces are s
 SLOW = 0.7  # a ringing output's error falls slower than the step to this power,
 IN_COMPANY = 1.4  # or to this one, if it is of vibration, where others ring
 SHOWN = 3  # times in a note
+WATCHED, FEW = 50, 2  # rows at least by which a disturbed run is held against the other, and steps to a row
+SHORTEST, LONGEST = 8, 64  # steps to a row, by which what it seems to show is looked at again
 QUICK = 1e7  # microseconds of the further runs, by `_cost`, up to which they are made unasked
 
 Beginning = Literal["as-given", "quasi-static", "steady", "periodic"]  # the default and the others
@@ -128,6 +133,18 @@ class _Runs:
     def vibrations(self) -> Vibrations:
         """Of the scene at its start."""
         return vibrations(self.assembled, self.start)
+
+    @cached_property
+    def free_to_leave(self) -> Assembled:
+        """The start in space where a plane was found for it, but for periodic motions, which take long to find."""
+        if self.begin == "periodic":
+            return self.assembled
+        return free_to_leave(self.scene, self.assembled, self.start, lambda one: begun(one, self.start, self.begin))
+
+    @cached_property
+    def feels(self) -> bool:
+        """Whether Python functions of the state act, of which nobody tells where on the way they jump or have a kink."""
+        return any(callback.with_state for callback in self.assembled.system.user.callbacks)
 
     @cached_property
     def untold(self) -> dict[str, list[float]]:
@@ -326,8 +343,13 @@ def _told(runs: _Runs, trial: _Trial, other: Any, *longer: Any) -> _Trial:
     order = 1 if too_long else PARTLY_STIFF if share == 0.5 else trial.method.order
     if runs.untold:
         order = OVER_BREAKS if trial.method.order == 3 else 1
+    farther = _farther(runs, trial.method, trial.count) if runs.feels else None
+    if runs.feels:
+        order = min(order, order_shown(trial.result, other, farther, order))
     twins = (*trial.twins, *(twin for twin in longer if not _failed(twin)))
     errors = step_errors(trial.result, other, order, twins)
+    if farther is not None:
+        errors = larger(errors, step_errors(trial.result, farther, order))
     start = _start(runs, trial.method, trial.result, trial.twins[0]) if trial.twins else ()
     return replace(trial, twins=twins, errors=with_start(errors, trial.result, *start) if start else errors)
 
@@ -337,7 +359,7 @@ def _further(
 ) -> list[Callable[[Say], Beside | None]]:
     """The further runs that tell the error of a run beside its twin: one with another step, and, beside a twin of half the
     step, one with a longer step; those of the last trial if its step is not too far."""
-    far = 2 if runs.untold else _leap(method)
+    far = 2 if runs.untold or runs.feels else _leap(method)
     near = next((one for one in reversed(earlier) if one.twins and count <= far * one.count), None)
     if near is not None:
         ratio = count / near.count
@@ -355,12 +377,24 @@ def _other(runs: _Runs, method: Any, count: int, say: Say) -> Beside:
         finer = replace(method, tolerances=tightened(method.tolerances, 10))
         return Beside(runs.run(finer, progress=say, looks=2 * LOOKS), 10.0 ** (-1.0 / method.order))
     if method.implicit and count > 1:
-        fewer = -(-count // (4 if method.order > SURE and not runs.untold else 2))
+        fewer = -(-count // (4 if method.order > SURE and not (runs.untold or runs.feels) else 2))
         try:
             return Beside(runs.run(replace(method, step=runs.output_step / fewer), progress=say), count / fewer)
         except ComputationError:
             pass  # half the step is sure to run
     return Beside(runs.run(replace(method, step=runs.output_step / (2 * count)), progress=say), 0.5)
+
+
+def _farther(runs: _Runs, method: Any, count: int) -> Beside | None:
+    """The run with about four times the step, of explicit methods twice, that tells with `_other` what order it keeps; None
+    where a row is not so long, such steps fail, or the method chooses its own."""
+    fewer = -(-count // (4 if method.implicit else 2))
+    if not 1 <= fewer <= count // 2:
+        return None
+    try:
+        return Beside(runs.run(replace(method, step=runs.output_step / fewer)), count / fewer)
+    except (ComputationError, InputError):  # of an explicit step that is too long
+        return None
 
 
 def _share(method: Integrator) -> float | None:
@@ -413,6 +447,7 @@ def _finished(runs: _Runs, trial: _Trial, path: str | Path | None, ringing: Set[
         *_unresolved(runs, trial, ringing),
         *_coarse(result),
         *_unstable(result, grown),
+        *(_left(runs, trial) if trial.errors and not grown else ()),
     ]
     trial = replace(trial, errors={name: _by_chance(e, grown.get(name, 0.0)) for name, e in trial.errors.items()})
     told = {name: [e.error, e.of_range] for name, e in trial.errors.items()}
@@ -502,6 +537,43 @@ def _unstable(result: Result, grown: Mapping[str, float]) -> list[str]:
         f"{name} grows from rounding to {far}{also}: the motion is unstable, and how far it has gone by then is chance; give "
         "it the imperfection that is meant, such as a small load or deflection"
     ]
+
+
+def _left(runs: _Runs, trial: _Trial) -> list[str]:
+    """A note where a disturbed motion leaves that of the run, by more steps of its own if it seems to by few."""
+    fine = max(1, math.ceil(WATCHED * runs.output_step / (runs.how["end"] - runs.start) - 1e-9))
+    again = int(np.clip(math.ceil(trial.count / fine), SHORTEST, LONGEST))
+    for steps in (FEW, again, LONGEST):
+        found = _departures(runs, trial.result, fine, steps)
+        if found is not None and (not found or steps > FEW):
+            break
+    if not found:
+        return []
+    name = max(found, key=lambda one: (one in trial.result.quantities, found[one]))
+    return [
+        f"the motion is unstable: a disturbance at the start grows to {found[name]:.1g} times its size by {name}, and the "
+        "run shows the motion without one; give it the imperfection that is meant, such as a small load or deflection"
+    ]
+
+
+def _departures(runs: _Runs, result: Result, fine: int, steps: int) -> dict[str, float] | None:
+    """What leaves the motion by a disturbance, seen by so many steps to rows that are so many times finer; None where such
+    runs fail."""
+    row, lasts = runs.output_step / fine, runs.how["end"] - runs.start
+    try:
+        still = runs.free_to_leave
+        states = still, pushed(still, runs.start, lasts)
+    except ComputationError:
+        return None
+    more = {"output_step": row, "outputs": places(still.system), "stopwatch": None}
+    calls = [
+        lambda say, one=one: replace(runs, assembled=one).run(Twin(row / steps), **more, progress=say) for one in states
+    ]
+    run, disturbed = runs.together(calls, leader=False)
+    if any(isinstance(one, InputError) or _failed(one) for one in (run, disturbed)):  # of steps that are rounding, too
+        return None
+    size = max(body.model.size for body in runs.scene.bodies) or 1.0
+    return departures(run, disturbed, size, float(result.time[-1]))
 
 
 def _by_chance(told: StepError, size: float) -> StepError:

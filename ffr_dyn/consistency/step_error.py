@@ -63,6 +63,7 @@ OVER_BREAKS = (
 )
 PARTLY_STIFF = 2.15  # order of ROS3, of an output of which it is not known whether elastic forces are stiff
 FAR, NEXT = 0.1, 2.0  # of the range, by which a step up to so many times as long makes a difference of order one
+KEEPS, KINKED = 0.8, 1.5  # of what a difference grows by with the step; an order between those of jumps and of kinks
 NOISE = (70 / 36) ** 0.5  # by which rows without relation are farther off the curve than they are large
 RATES = {"position": "velocity", "R": "v", "q": "q_dot"}
 CONSTANT = 1e-7  # of the size of a kind: a range below it is rounding, as of the rate of an even turn
@@ -181,6 +182,28 @@ def step_errors(run: Result, other: Beside | None, order: float, twins: Sequence
         numbers = (column.tolist() for column in (errors, shares, off > VIBRATION * smooth))
         found |= {name: StepError(*of) for name, *of in zip(names, *numbers, strict=True)}
     return found
+
+
+def order_shown(run: Result, other: Beside, farther: Beside | None, order: float) -> float:
+    """The order by which the differences from two other steps grow in all outputs, at most that of the method. It is lost
+    where forces jump or have kinks within steps: one then, or between; one as well where there is no second."""
+    if farther is None:
+        return 1.0
+    scales, found = ranges(run), np.inf
+    for names in _batches(run, scales):
+        y, size = _columns(run, names), np.array([scales[name] for name in names])
+        near, far = (_apart(y, y.table, _columns(one.result, names).table) for one in (other, farther))
+        seen = near > SEEN * size
+        found = min(found, (far[seen] / near[seen]).min(initial=np.inf))
+    for shown in (order, KINKED):
+        if found >= KEEPS * abs((farther.ratio**shown - 1.0) / (other.ratio**shown - 1.0)):
+            return shown
+    return 1.0
+
+
+def larger(one: Mapping[str, StepError], other: Mapping[str, StepError]) -> dict[str, StepError]:
+    """Of every output the larger one of two errors."""
+    return {name: max(one[name], other[name], key=lambda each: each.error) for name in one}
 
 
 def begins_alone(run: Result, twin: Result) -> bool:
