@@ -88,14 +88,15 @@ def sparse_product(A: sp.csr_array, X: Array, each: Map, out: Array | None = Non
     return out
 
 
-def product(A: sp.csr_array, X: Array) -> Array:
-    """A X for a sparse A (n, m) and X (m, b), on all threads."""
+def product(A: sp.sparray, X: Array) -> Array:
+    """A X for a sparse A (n, m) of any form and X (m, b), on all threads."""
     with threads() as each:
-        return sparse_product(A, X, each)
+        return sparse_product(sp.csr_array(A), X, each)
 
 
-def product_of_sizes(A: sp.csr_array, X: Array) -> Array:
-    """|A| |X| for a sparse A (n, m) and X (m, b), on all threads and without a copy of A."""
+def product_of_sizes(A: sp.sparray, X: Array) -> Array:
+    """|A| |X| for a sparse A (n, m) of any form and X (m, b), on all threads and without a copy of an A in rows."""
+    A = sp.csr_array(A)
     sizes, out = np.ascontiguousarray(np.abs(X)), np.empty((A.shape[0], X.shape[1]))
 
     def rows(part: slice) -> None:
