@@ -84,9 +84,16 @@ def _numbered(blocks: Blocks, corners: Sequence[Array]) -> tuple[tuple[Array, ..
     faces = tuple(nodes[:, KINDS[kind].faces].reshape(-1, KINDS[kind].faces.shape[1]) for kind, nodes in blocks)
     of_sides = [_keys(side[:, : face_corners(side.shape[1])]) for side in faces]
     keys = np.concatenate([*of_sides, *map(_keys, corners)])
-    _, number = np.unique(keys, axis=0, return_inverse=True)
+    base = keys.max(initial=0) + 2
+    high, low = (
+        (keys[:, k] + 1) * base + keys[:, k + 1] + 1 for k in (0, 2)
+    )  # sorted in a third of the time of the rows
+    order = np.lexsort((low, high))
+    new = (np.diff(high[order]) != 0) | (np.diff(low[order]) != 0)
+    number = np.empty(len(keys), int)
+    number[order] = np.cumsum(np.concatenate([np.zeros(min(len(keys), 1), int), new]))
     count = sum(map(len, faces))
-    return faces, number.ravel()[count:], number.ravel()[:count]
+    return faces, number[count:], number[:count]
 
 
 def _keys(corners: Array) -> Array:

@@ -16,6 +16,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ffr_prep.common.arrays import Array
+from ffr_prep.solvers.threads import product
 
 
 @dataclass(frozen=True)
@@ -39,7 +40,7 @@ def inertia_integrals(points: Array, m: sp.sparray, Phi: Array) -> InertiaIntegr
     of_nodes = m @ np.ones(count)
     momenta = m @ points
     modes = Phi.reshape(count, 3 * n)
-    PP = (modes.T @ (m @ modes)).reshape(3, n, 3, n).transpose(0, 2, 1, 3)
+    PP = (modes.T @ product(m, modes)).reshape(3, n, 3, n).transpose(0, 2, 1, 3)
     rr = points.T @ momenta
     return InertiaIntegrals(
         mass=float(of_nodes.sum()),

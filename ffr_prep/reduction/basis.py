@@ -25,7 +25,7 @@ from ffr_prep.common.progress import Advance, no_advance
 from ffr_prep.model.coupled import CoupledModel
 from ffr_prep.model.reference import body_length, free_rigid_motions, motion_in_words
 from ffr_prep.solvers.factor import CHOLESKY, FreeBody, Solver, free_body
-from ffr_prep.solvers.threads import product_of_sizes
+from ffr_prep.solvers.threads import product, product_of_sizes
 from ffr_prep.solvers.verification import Verification
 
 _TIE = 1e-6
@@ -143,7 +143,7 @@ def _admissible(vectors: Array, L: Array) -> Array:
 
 def diagonalised(model: CoupledModel, vectors: Array, K: Array) -> Basis:
     """The mass-orthonormal basis of the same space in which the stiffness K (p, p) is diagonal."""
-    M = vectors.T @ (model.M @ vectors)
+    M = vectors.T @ product(model.M, vectors)
     scale = 1 / np.sqrt(np.diag(M))
     omega2, combination = scipy.linalg.eigh(K * np.outer(scale, scale), M * np.outer(scale, scale))
     Z = _aligned(model, vectors @ (scale[:, None] * combination), omega2)
@@ -191,10 +191,10 @@ def check_basis(model: CoupledModel, L: Array, basis: Basis) -> None:
     InputError when the mass has no inertia against a rigid motion.
     """
     Z, omega2 = basis.Z, basis.omega2
-    _check_small("Z^T M Z - I", Z.T @ (model.M @ Z) - np.eye(len(omega2)), 1e-9)
+    _check_small("Z^T M Z - I", Z.T @ product(model.M, Z) - np.eye(len(omega2)), 1e-9)
     noise = 1e-12 * np.einsum("zi,zi->i", np.abs(Z), product_of_sizes(model.K, Z)).max(initial=0.0)
     allowed = noise + 1e-7 * omega2.max(initial=0.0)
-    _check_small("Z^T K Z - diag(omega2)", Z.T @ (model.K @ Z) - np.diag(omega2), allowed)
+    _check_small("Z^T K Z - diag(omega2)", Z.T @ product(model.K, Z) - np.diag(omega2), allowed)
     _check_small("L Z", L @ Z, 1e-8 * np.abs(Z).max(initial=0.0))
     if omega2.size and not omega2[0] > 0:
         raise ComputationError(

@@ -13,17 +13,21 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
 
+import numba
 import numpy as np
 import scipy.sparse as sp
 import skfem
 from skfem.quadrature import get_quadrature
 
 from ffr_prep.common.arrays import Array
+from ffr_prep.common.compile_cache import check_compiled_code
 from ffr_prep.common.errors import InputError
 from ffr_prep.mesh.mesh import Mesh
 from ffr_prep.mesh.shapes import determinants, local_order, mapping, scalar_basis
 from ffr_prep.model.material import AnisotropicMaterial, Material, Solid
 from ffr_prep.solvers.threads import ahead
+
+check_compiled_code()
 
 Materials = Solid | Mapping[str, Solid]
 
@@ -50,8 +54,7 @@ def assemble(mesh: Mesh, material: Materials) -> SolidMatrices:
     """
     pattern = _pattern(mesh)
     K, m = np.zeros((3, 3, pattern.nnz)), np.zeros(pattern.nnz)
-    for nodes, mass, stiffness in ahead(partial(_of_chunk, mesh.points), chunks(mesh, material)):
-        places = np.asarray(pattern[tuple(nodes)]).ravel()
+    for places, mass, stiffness in ahead(partial(_of_chunk, mesh.points, pattern), chunks(mesh, material)):
         np.add.at(m, places, mass)
         for i, j, of_block in zip(*np.tril_indices(3), stiffness, strict=True):
             np.add.at(K[i, j], places, of_block)
@@ -63,12 +66,29 @@ def assemble(mesh: Mesh, material: Materials) -> SolidMatrices:
     )
 
 
-def _of_chunk(points: Array, chunk: Chunk) -> tuple[Array, Array, list[Array]]:
-    """Pairs of nodes (2, e k k), and for each its mass and the six blocks K_ij, i >= j, of its stiffness."""
+def _of_chunk(points: Array, pattern: sp.csr_array, chunk: Chunk) -> tuple[Array, Array, list[Array]]:
+    """The numbers of pairs of nodes (e k k,), and for each its mass and the six blocks K_ij, i >= j, of its stiffness."""
     mass = mass_form(chunk.material.rho).elemental(_basis(points, chunk, MASS_ORDER))
     basis, C = _basis(points, chunk, STIFFNESS_ORDER), chunk.material.elasticity_tensor()
     blocks = zip(*np.tril_indices(3), strict=True)
-    return mass.indices, mass.data, [stiffness_form(C[i, :, j]).elemental(basis).data for i, j in blocks]
+    places = numbers_of_pairs(pattern.indptr, pattern.indices, *mass.indices)
+    return places, mass.data, [stiffness_form(C[i, :, j]).elemental(basis).data for i, j in blocks]
+
+
+@numba.njit(cache=True, nogil=True)
+def numbers_of_pairs(indptr, indices, rows, columns):  # type: ignore[no-untyped-def]
+    """(p,) where the entries (rows, columns) of a sparse matrix are, whose columns ascend in every row."""
+    found = np.empty(rows.size, np.int64)
+    for i in range(rows.size):
+        first, last = indptr[rows[i]], indptr[rows[i] + 1]
+        while first < last:
+            middle = (first + last) // 2
+            if indices[middle] < columns[i]:
+                first = middle + 1
+            else:
+                last = middle
+        found[i] = first
+    return found
 
 
 def stiffness_form(C: Array) -> skfem.BilinearForm:

@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numba
 import numpy as np
 import scipy.sparse as sp
 
 from ffr_prep.body.accelerations import INERTIAL
 from ffr_prep.common.arrays import Array
+from ffr_prep.common.compile_cache import check_compiled_code
 from ffr_prep.common.errors import InputError
 from ffr_prep.mesh.mesh import Mesh, face_group, region_nodes
 from ffr_prep.mesh.shapes import face_mass
@@ -17,6 +19,8 @@ from ffr_prep.model.coupled import CoupledModel, InterfaceRegion, check_independ
 from ffr_prep.model.region_rotations import MeanRegion, RigidRegion, force_moments
 from ffr_prep.model.ties import check_names, interface_coordinates, six_rows, tied_rows
 from ffr_prep.solids.assembly import SolidMatrices, vector_mass
+
+check_compiled_code()
 
 _COLLINEAR = 1e-10
 
@@ -55,12 +59,40 @@ def _tied(A: sp.csr_array, B: sp.csr_array, free: Array) -> sp.csr_array:
     following = sp.csr_array(B[:, free.size :])
     along = sp.csr_array(A @ following)
     across = along[free]
-    own, corner = A[free][:, free], sp.csr_array(following.T @ along)
-    rows = [sp.hstack([own, across], format="csr"), sp.hstack([sp.csr_array(across.T), corner], format="csr")]
-    whole = sp.csr_array(sp.vstack(rows, format="csr"))
-    whole.eliminate_zeros()
-    whole.sort_indices()  # products of matrices leave neither, and bits depend on the order of sums
-    return whole
+    last = sp.csr_array(sp.hstack([across.T, following.T @ along], format="csr"))
+    for product in across, last:
+        product.eliminate_zeros()
+        product.sort_indices()  # products of matrices leave neither, and bits depend on the order of sums
+    new = np.full(A.shape[0], -1, A.indices.dtype)
+    new[free] = np.arange(free.size)
+    data, indices, ends = _beside(
+        A.indptr, A.indices, A.data, free, new, across.indptr, across.indices, across.data, last.nnz
+    )
+    data[ends[-1] :], indices[ends[-1] :] = last.data, last.indices
+    ends = np.concatenate([ends, ends[-1] + last.indptr[1:]]).astype(A.indptr.dtype)
+    return sp.csr_array((data, indices, ends), shape=(ends.size - 1, ends.size - 1))
+
+
+@numba.njit(cache=True)
+def _beside(indptr, indices, data, free, new, ends, columns, values, room):  # type: ignore[no-untyped-def]
+    """Numbers, columns and ends of the free rows of a matrix: those of free columns under their new numbers, and then those
+    of another matrix (ends, columns, values) whose columns follow; without zeros, with room for more."""
+    count, made = 0, np.zeros(free.size + 1, np.int64)
+    for i in free:
+        for e in range(indptr[i], indptr[i + 1]):
+            count += new[indices[e]] >= 0 and data[e] != 0
+    numbers, places = np.empty(count + values.size + room), np.empty(count + values.size + room, indices.dtype)
+    at = 0
+    for k in range(free.size):
+        for e in range(indptr[free[k]], indptr[free[k] + 1]):
+            if new[indices[e]] >= 0 and data[e] != 0:
+                numbers[at], places[at] = data[e], new[indices[e]]
+                at += 1
+        for e in range(ends[k], ends[k + 1]):
+            numbers[at], places[at] = values[e], free.size + columns[e]
+            at += 1
+        made[k + 1] = at
+    return numbers, places, made
 
 
 def turning_regions(

@@ -28,12 +28,10 @@ from ffr_prep.solvers.multifrontal import (
     Sorted,
     Workspace,
     add,
-    backward,
     begin,
     boundaries,
     diagonal_tile,
     eliminate_branch,
-    forward,
     keep,
     kept,
     largest,
@@ -46,7 +44,8 @@ from ffr_prep.solvers.multifrontal import (
     update_tile,
 )
 from ffr_prep.solvers.nested_dissection import NOTHING, elimination_tree
-from ffr_prep.solvers.threads import Map, threads
+from ffr_prep.solvers.substitution import LeafRows, backward, forward, leaf_rows
+from ffr_prep.solvers.threads import Map, finish, pieces, threads
 
 _BRANCHES = 24  # a branch has at most this part of the work
 Made = TypeVar("Made")
@@ -81,16 +80,18 @@ class Division:
 class Factor:
     """P A P^T = L L^T.
 
-    matrix  : A in the order of its elimination, of which leaves have their rows
+    order   : the unknown at each place of the elimination
     fronts  : the columns of L
+    leaves  : rows of A, which leaves have in the place of their rows of L
     stages  : the fronts in turn, each stage of runs that are independent of each other: all branches, then fronts of the
               trunk whose fronts below are done
     targets : rows of the boundaries in a solution: a run has copies of the rows outside it
     rows    : how many rows a solution has, with the copies after the n unknowns
     """
 
-    matrix: Sorted
+    order: Array
     fronts: Fronts
+    leaves: LeafRows
     division: Division
     stages: list[list[Run]]
     targets: Array
@@ -124,37 +125,44 @@ def cholesky(A: sp.csr_array, positions: Array, advance: Advance = no_advance, h
     fronts = analysis.fronts._replace(panels=np.empty(analysis.fronts.offsets[-1]))
     with threads() as each:
         _eliminate_all(fronts, division, matrix, each, progress_of(analysis, advance))
-    return Factor(matrix, fronts, division, *_stages(fronts, division))
+    stages, targets, rows = _stages(fronts, division)
+    leaves = LeafRows(*leaf_rows(fronts, targets, matrix))
+    return Factor(matrix.order, fronts, leaves, division, stages, targets, rows)
 
 
 def solve_cholesky(factor: Factor, b: Array) -> Array:
     """A^-1 b for b (n, r)."""
-    order = factor.matrix.order
-    n = len(order)
-    y = np.empty((factor.rows, b.shape[1]))
-    np.take(b, order, axis=0, out=y[:n], mode="clip")  # which needs no copy
-    y[n:] = 0.0
-    _swept(factor, y)
-    x = np.zeros(b.shape)
-    x[order] = y[:n]
+    n, order = len(factor.order), factor.order
+    y, x = np.empty((factor.rows, b.shape[1])), np.zeros(b.shape)
+
+    def begin(part: slice) -> None:
+        np.take(b, order[part], axis=0, out=y[part], mode="clip")  # which needs no copy
+
+    def end(part: slice) -> None:
+        x[order[part]] = y[part]
+
+    with threads() as each:
+        finish(each(begin, pieces(n)))
+        y[n:] = 0.0
+        _swept(factor, y, each)
+        finish(each(end, pieces(n)))
     return x
 
 
-def _swept(factor: Factor, y: Array) -> None:
+def _swept(factor: Factor, y: Array, each: Map) -> None:
     """(L L^T)^-1 of the rows y of a solution, in place."""
-    fronts, targets, matrix = factor.fronts, factor.targets, factor.matrix
+    fronts, targets, leaves = factor.fronts, factor.targets, factor.leaves
 
     def back(run: Run) -> None:
         y[run.at : run.at + len(run.copied)] = y[run.copied]
-        backward(fronts, targets, matrix, run.first, run.last, y)
+        backward(fronts, targets, leaves, run.first, run.last, y)
 
-    with threads() as each:
-        for stage in factor.stages:
-            finish(each(lambda run: forward(fronts, targets, matrix, run.first, run.last, y), stage))
-            for run in stage:
-                y[run.copied] += y[run.at : run.at + len(run.copied)]
-        for stage in reversed(factor.stages):
-            finish(each(back, stage))
+    for stage in factor.stages:
+        finish(each(lambda run: forward(fronts, targets, leaves, run.first, run.last, y), stage))
+        for run in stage:
+            y[run.copied] += y[run.at : run.at + len(run.copied)]
+    for stage in reversed(factor.stages):
+        finish(each(back, stage))
 
 
 # ---- division of the work -----------------------------------------------------------------------------------------
@@ -369,12 +377,6 @@ def _eliminate_tiled(fronts: Fronts, k: int, front: Array, update: Array, each: 
 def tiles(start: int, stop: int) -> list[tuple[int, int]]:
     """start...stop in pieces that do not depend on the number of threads."""
     return [(first, min(first + _TILE, stop)) for first in range(start, stop, _TILE)]
-
-
-def finish(results: Iterable[None]) -> None:
-    """Wait for all, and raise what one of them raised."""
-    for _ in results:
-        pass
 
 
 def _check_pivot(bad: int) -> None:

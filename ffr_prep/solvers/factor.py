@@ -32,7 +32,7 @@ from ffr_prep.solvers.inertia import modes_below
 from ffr_prep.solvers.lanczos import lowest_modes
 from ffr_prep.solvers.nested_dissection import NOTHING
 from ffr_prep.solvers.slepc import SlepcProcess, mpi_count, mpi_modes, mpi_solve, pencil, started
-from ffr_prep.solvers.threads import pieces, product_of_sizes
+from ffr_prep.solvers.threads import finish, pieces, product, product_of_sizes, threads
 from ffr_prep.solvers.verification import Verification, verified
 
 Solve = Callable[[Array], Array]
@@ -306,15 +306,19 @@ def solve_supported(problem: SupportedBody, f: Array, c: Array) -> tuple[Array, 
     right = np.vstack([c - problem.C @ particular, problem.body.T.T @ f])
     solution = scipy.linalg.lu_solve(problem.bordered, problem.scale[:, None] * right) * problem.scale[:, None]
     mu, alpha = solution[: len(c)], solution[len(c) :]
-    for part in pieces(len(particular)):  # in place, as fresh memory takes longer than filling it
+
+    def complete(part: slice) -> None:  # in place, as fresh memory takes longer than filling it
         particular[part] += problem.body.T[part] @ alpha - problem.flexibility[part] @ mu
+
+    with threads() as each:
+        finish(each(complete, pieces(len(particular))))
     return particular, mu
 
 
 def solve_refined(problem: SupportedBody, f: Array, c: Array) -> tuple[Array, Array]:
     """As `solve_supported`, with one step of iterative refinement; ComputationError when the residual stays large."""
     u, mu = solve_supported(problem, f, c)
-    residual = f - problem.body.K @ u - problem.C.T @ mu
+    residual = f - product(problem.body.K, u) - problem.C.T @ mu
     du, dmu = solve_supported(problem, residual, c - problem.C @ u)
     u, mu = u + du, mu + dmu
     _check_residual(problem, f, u, mu)
@@ -323,7 +327,7 @@ def solve_refined(problem: SupportedBody, f: Array, c: Array) -> tuple[Array, Ar
 
 def _check_residual(problem: SupportedBody, f: Array, u: Array, mu: Array) -> None:
     reaction = problem.C.T @ mu
-    residual = np.linalg.norm(f - problem.body.K @ u - reaction)
+    residual = np.linalg.norm(f - product(problem.body.K, u) - reaction)
     noise = np.linalg.norm(product_of_sizes(problem.body.K, u))
     allowed = 1e-6 * (np.linalg.norm(f) + np.linalg.norm(reaction)) + 1e-11 * noise
     if not residual <= allowed:

@@ -31,7 +31,6 @@ from ffr_prep.solvers.cholesky import (
     add_tiled,
     analysed,
     begun,
-    finish,
     on_branches,
     packed,
     progress_of,
@@ -58,7 +57,7 @@ from ffr_prep.solvers.multifrontal import (
     shape,
     taken,
 )
-from ffr_prep.solvers.threads import Map, threads
+from ffr_prep.solvers.threads import Map, finish, threads
 
 check_compiled_code()
 

@@ -21,7 +21,7 @@ import scipy.sparse as sp
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError
 from ffr_prep.common.progress import Advance, no_advance
-from ffr_prep.solvers.threads import Map, pieces, sparse_product, threads
+from ffr_prep.solvers.threads import Map, finish, pieces, sparse_product, threads
 
 _RESIDUAL = 1e-9
 _DEPENDENT = 1e-10
@@ -174,8 +174,7 @@ def _take_out(vectors: Array, Q: SearchSpace, coordinates: Array, each: Map, fir
         for numbers, rows in Q.used(first):
             vectors[part] -= rows[:, part].T @ coordinates[numbers]
 
-    for _ in each(from_rows, pieces(len(vectors))):
-        pass
+    finish(each(from_rows, pieces(len(vectors))))
 
 
 def _combined(Q: SearchSpace, coordinates: Array) -> Array:
@@ -191,8 +190,7 @@ def _combined(Q: SearchSpace, coordinates: Array) -> Array:
             panel[: len(some), part] = some
 
     with threads() as each:
-        for _ in each(of_rows, pieces(Q.panels[0].shape[1])):
-            pass
+        finish(each(of_rows, pieces(Q.panels[0].shape[1])))
     del Q.panels[-(-count // _PANEL) :]
     Q.size = count
     vectors = np.empty((Q.panels[0].shape[1], count))

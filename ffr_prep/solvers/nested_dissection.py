@@ -16,6 +16,7 @@ import scipy.sparse as sp
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.compile_cache import check_compiled_code
 from ffr_prep.solvers.separators import separated
+from ffr_prep.solvers.threads import threads
 
 check_compiled_code()
 
@@ -87,25 +88,42 @@ def _joined(by_point: Array, ends: Array, piece: Array) -> Array:
 
 def _dissection(points: Array, graph: sp.csr_array) -> Tree:
     """Pieces of the points (N, 3) in the order of elimination, with the pieces below each."""
+    cuts = _cuts(points, graph)
     pieces: list[Array] = []
     children: list[list[int]] = []
-    place = np.full(len(points), -1)
 
-    def add(piece: Array, below: list[int]) -> list[int]:
+    def add(number: int) -> list[int]:
+        """The pieces of a part and of those that it is cut into; which of them are below no other."""
+        piece, halves = cuts[number]
+        below = [k for half in halves for k in add(half)]
         if not piece.size:
             return below
         pieces.append(piece)
         children.append(below)
         return [len(pieces) - 1]
 
-    def dissect(part: Array) -> list[int]:
-        if len(part) <= _LEAF:
-            return add(part, [])
-        one, two, separator = _cut(points, graph, part, place)
-        return add(separator, dissect(one) + dissect(two))
-
-    dissect(np.arange(len(points)))
+    add(0)
     return pieces, children
+
+
+def _cuts(points: Array, graph: sp.csr_array) -> list[tuple[Array, list[int]]]:
+    """For each part what separates its halves, and their numbers; a leaf has itself alone. The first is the whole."""
+    place = np.full(len(points), -1)  # parts that are cut at the same time do not touch: all of them may use it
+    found: list[tuple[Array, list[int]]] = []
+
+    def divided(part: Array) -> tuple[Array, ...]:
+        return (part,) if len(part) <= _LEAF else _cut(points, graph, part, place)
+
+    with threads() as each:
+        parts, known = [np.arange(len(points))], 1
+        while parts:
+            following: list[Array] = []
+            for *halves, piece in each(divided, parts):
+                found.append((piece, list(range(known, known + len(halves)))))
+                following += halves
+                known += len(halves)
+            parts = following
+    return found
 
 
 def _cut(points: Array, graph: sp.csr_array, part: Array, place: Array) -> tuple[Array, Array, Array]:

@@ -55,7 +55,7 @@ def _parts(this: Array, band: Array, other: Array, start: Array, steps: Array) -
     )
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, nogil=True)
 def _touching(indptr, indices, below, place):  # type: ignore[no-untyped-def]
     """(p,) which of the points below touch one above."""
     found = np.zeros(below.size, np.bool_)
@@ -67,7 +67,7 @@ def _touching(indptr, indices, below, place):  # type: ignore[no-untyped-def]
     return found
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, nogil=True)
 def _within(indptr, indices, band, place):  # type: ignore[no-untyped-def]
     """Neighbours of the points of the band within it, as of a sparse matrix, and which touch points below and above."""
     ends = np.zeros(band.size + 1, np.int32)
@@ -85,7 +85,7 @@ def _within(indptr, indices, band, place):  # type: ignore[no-untyped-def]
     return ends, near, start, stop
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, nogil=True)
 def _reached(indptr, indices, band, place, touching):  # type: ignore[no-untyped-def]
     """(m,) which points of the band are at the start, next to points below, and at the stop, next to points above; (m, 2)
     steps in the residual graph of a largest flow from the start, and backwards from the stop."""
@@ -99,7 +99,7 @@ def _reached(indptr, indices, band, place, touching):  # type: ignore[no-untyped
     return start, stop, _steps(ends, near, start, stop, before, after), back
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, nogil=True)
 def _steps(ends, near, start, stop, before, after):  # type: ignore[no-untyped-def]
     """(m, 2) how many steps lead from the start to the entry and exit of each point, -1 where none do."""
     steps = np.full((start.size, 2), _NONE, np.int32)
@@ -139,7 +139,7 @@ def _way(ends, near, before, i, side, choice):  # type: ignore[no-untyped-def]
     return (_NONE if before[i] == _NONE else i), _IN  # nothing passes it any more
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, nogil=True)
 def _augment(ends, near, start, stop, before, after, back):  # type: ignore[no-untyped-def]
     """Send flow along ways that come nearer to the stop with every step; each entry and exit is tried once. Whether any is
     sent. back (m, 2) : steps backwards from the stop, to the exit of each point and to its entry
@@ -173,7 +173,7 @@ def _augment(ends, near, start, stop, before, after, back):  # type: ignore[no-u
     return sent
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, nogil=True)
 def _send(way, height, before, after):  # type: ignore[no-untyped-def]
     """One unit of flow along a way."""
     before[way[0, 0]] = _END

@@ -64,6 +64,12 @@ def on_one_thread(function: Callable[Given, Made]) -> Callable[Given, Made]:
     return alone
 
 
+def finish(results: Iterable[None]) -> None:
+    """Wait for all, and raise what one of them raised."""
+    for _ in results:
+        pass
+
+
 def pieces(size: int) -> list[slice]:
     """The rows of a long array in pieces."""
     ends = np.linspace(0, size, min(_PIECES, max(size, 1)) + 1).astype(int)
@@ -75,41 +81,40 @@ def sparse_product(A: sp.csr_array, X: Array, each: Map, out: Array | None = Non
     X = np.ascontiguousarray(X)
     out = np.empty((A.shape[0], X.shape[1])) if out is None else out
 
-    multiply = _multiply if X.shape[1] % 4 else _multiply_by_four
-
     def rows(part: slice) -> None:
-        multiply(A.indptr, A.indices, A.data, X, out, part.start, part.stop)
+        _multiply(A.indptr, A.indices, A.data, X, out, part.start, part.stop)
 
-    for _ in each(rows, pieces(len(out))):
-        pass
+    finish(each(rows, pieces(len(out))))
     return out
 
 
-def product_of_sizes(A: sp.csr_array, X: Array) -> Array:
-    """|A| |X| for a sparse A (n, m) and X (m, b), without a copy of either."""
-    return np.concatenate([abs(A[rows]) @ np.abs(X) for rows in pieces(A.shape[0])])
+def product(A: sp.sparray, X: Array) -> Array:
+    """A X for a sparse A (n, m) of any form and X (m, b), on all threads."""
+    with threads() as each:
+        return sparse_product(sp.csr_array(A), X, each)
+
+
+def product_of_sizes(A: sp.sparray, X: Array) -> Array:
+    """|A| |X| for a sparse A (n, m) of any form and X (m, b), on all threads and without a copy of an A in rows."""
+    A = sp.csr_array(A)
+    sizes, out = np.ascontiguousarray(np.abs(X)), np.empty((A.shape[0], X.shape[1]))
+
+    def rows(part: slice) -> None:
+        here = slice(A.indptr[part.start], A.indptr[part.stop])
+        ends = A.indptr[part.start : part.stop + 1] - A.indptr[part.start]
+        _multiply(ends, A.indices[here], np.abs(A.data[here]), sizes, out[part], 0, len(ends) - 1)
+
+    with threads() as each:
+        finish(each(rows, pieces(len(out))))
+    return out
 
 
 @numba.njit(cache=True, nogil=True)
 def _multiply(indptr, indices, data, X, out, first, last):  # type: ignore[no-untyped-def]
     for i in range(first, last):
-        for j in range(X.shape[1]):
-            out[i, j] = 0.0
+        row = out[i]
+        row[:] = 0.0
         for k in range(indptr[i], indptr[i + 1]):
-            for j in range(X.shape[1]):
-                out[i, j] += data[k] * X[indices[k], j]
-
-
-@numba.njit(cache=True, nogil=True)
-def _multiply_by_four(indptr, indices, data, X, out, first, last):  # type: ignore[no-untyped-def]
-    """As `_multiply`, four columns at a time, which stay in registers."""
-    for i in range(first, last):
-        for j in range(0, X.shape[1], 4):
-            a = b = c = d = 0.0
-            for k in range(indptr[i], indptr[i + 1]):
-                value, row = data[k], indices[k]
-                a += value * X[row, j]
-                b += value * X[row, j + 1]
-                c += value * X[row, j + 2]
-                d += value * X[row, j + 3]
-            out[i, j], out[i, j + 1], out[i, j + 2], out[i, j + 3] = a, b, c, d
+            value, other = data[k], X[indices[k]]
+            for j in range(row.size):
+                row[j] += value * other[j]
