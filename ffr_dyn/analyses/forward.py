@@ -52,7 +52,7 @@ from ffr_dyn.integrators import Integrator, Within, stepped
 from ffr_dyn.integrators.ros2 import Twin
 from ffr_dyn.integrators.stabilisation import Projection, Stabilisation
 from ffr_dyn.integrators.tolerances import tightened
-from ffr_dyn.linear.departure import departures, free_to_leave, places, pushed
+from ffr_dyn.linear.departure import at_rest_in_part, departures, free_to_leave, places, pushed
 from ffr_dyn.linear.steady_state import steadily
 from ffr_dyn.results.file import load_result, with_attributes
 from ffr_dyn.results.result import Result
@@ -69,7 +69,7 @@ SURE = 2  # order that linearly implicit methods keep where elastic forces are s
 SLOW = 0.7  # a ringing output's error falls slower than the step to this power,
 IN_COMPANY = 1.4  # or to this one, if it is of vibration, where others ring
 SHOWN = 3  # times in a note
-WATCHED, FEW = 50, 2  # rows at least by which a disturbed run is held against the other, and steps to a row
+WATCHED, FEW = 50, 1  # rows at least by which a disturbed run is held against the other, and steps to a row
 SHORTEST, LONGEST = 8, 64  # steps to a row, by which what it seems to show is looked at again
 QUICK = 1e7  # microseconds of the further runs, by `_cost`, up to which they are made unasked
 
@@ -541,6 +541,8 @@ def _unstable(result: Result, grown: Mapping[str, float]) -> list[str]:
 
 def _left(runs: _Runs, trial: _Trial) -> list[str]:
     """A note where a disturbed motion leaves that of the run, by more steps of its own if it seems to by few."""
+    if not at_rest_in_part(trial.result, runs.assembled.system):
+        return []
     fine = max(1, math.ceil(WATCHED * runs.output_step / (runs.how["end"] - runs.start) - 1e-9))
     again = int(np.clip(math.ceil(trial.count / fine), SHORTEST, LONGEST))
     for steps in (FEW, again, LONGEST):

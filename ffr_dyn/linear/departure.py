@@ -30,6 +30,7 @@ LEAVES = (
     1e3  # times the push: what a machine is off its drawing by, 1e-6 of its size, is then as large as errors of a run
 )
 FULL, ROWS = 0.3, 3  # of the largest difference; rows in which the first half of its decades is seen
+STILL = 1e-10  # of the largest of its kind, or of a turn, by which what is left alone moves by rounding
 LATE = 0.45  # of the time in which a difference grows LEAVES times, that half of its decades take at least
 POSES, MOVES = re.compile(r"\.(position|R|p)$"), re.compile(r"\.(position|R|p|angle|stroke|displacement|rotation)$")
 
@@ -58,6 +59,21 @@ def pushed(assembled: Assembled, time: float, lasts: float) -> Assembled:
         sizes[place.q_dot(b)] = body.model.size * np.sqrt(body.model.mass)
     faster = Z @ (Z.T @ (M @ (PUSH / lasts * sizes * push)))
     return replace(assembled, v=assembled.v + to_global_axes(place, assembled.x, faster))
+
+
+def at_rest_in_part(run: Result, system: System) -> bool:
+    """Whether something is left alone in a run that others might disturb: a body that does not turn, or in space not about
+    one of its axes, or a mode that stays as it is. Where all moves, the steps are a disturbance, and their error tells."""
+    spatial = not any(normal >= 0 for normal in system.layout.normals)
+    found = list[Array]()
+    for name, quantity in run.quantities.items():
+        values = quantity.values.reshape(run.time.size, -1)
+        moved, size = np.ptp(values, axis=0), np.abs(values).max(initial=0.0)
+        if name.endswith(".p"):
+            found.append(np.atleast_1d(moved.max(initial=0.0) <= STILL))
+        if name.endswith(".q") or (spatial and name.endswith(".omega_bar")):
+            found.append(moved <= STILL * size)
+    return not found or bool(np.concatenate(found).any())
 
 
 def places(system: System) -> list[str]:
