@@ -27,7 +27,7 @@ from ffr_dyn.analyses.forward import Beginning, Forward, forward
 from ffr_dyn.analyses.settings import Settings
 from ffr_dyn.consistency.assemble import Assembled, assemble
 from ffr_dyn.economy.cache import Ledger, Tried
-from ffr_dyn.economy.checks import frequencies, stiffening_loads
+from ffr_dyn.economy.checks import frequencies, stiffening_loads, stress_doubts
 from ffr_dyn.economy.contributions import Contributions, nothing, of_motion, of_omitted, own
 from ffr_dyn.economy.inertia_terms import TermEffect
 from ffr_dyn.economy.model_choice import Choice, applied
@@ -331,7 +331,10 @@ def _finished(ledger: Ledger, found: Chosen, verify: bool | None) -> Economy:
         unmoved=unmoved(found.omitted, found.scales, names, ledger.policy),
         frequencies=frequencies(final, ledger.made(found.everything), found.everything, ledger.scene, ledger.policy),
         stiffening=stiffening_loads(final, ledger.policy),
-        notes=tuple(final.result.attributes["notes"]),
+        notes=(
+            *final.result.attributes["notes"],
+            *stress_doubts(final, ledger.scene, ledger.of, found.limits),
+        ),
         verification=verification,
         policy=ledger.policy,
     )

@@ -514,6 +514,19 @@ def test_what_is_said_of_a_model_is_true(name, verify):
         assert "Verified" in as_text(found)
 
 
+def test_stress_that_the_shapes_of_the_full_model_lack_is_told():
+    """Of its own inertia: no reference tells that, since the full model lacks it too."""
+    lacking = slider_crank(100.0)
+    rod = next(body for body in lacking.bodies if body.name == "rod")
+    for lacks, told in ((0.0, False), (5e3, True)):  # Pa s^2, under spin about z'
+        kept = {"left_out": [0.0] * 8 + [lacks] + [0.0] * 3, "largest": [1e4] * 12}
+        made = replace(rod, model=replace(rod.model, provenance={**rod.model.provenance, "steady_stress": kept}))
+        scene = replace(lacking, bodies=tuple(made if one.name == "rod" else one for one in lacking.bodies))
+        found = economise(scene, ["rod.stress=1e4"], end=0.02, output_step=0.001, verify=False)
+        assert any("leave out up to" in note for note in found.notes) is told
+        assert ("leave out up to" in as_text(found)) is told
+
+
 # ---- report, advice, chart, command ---------------------------------------------------------------------------------
 
 

@@ -134,6 +134,7 @@ MATERIALS = [
     edited(materials, "block.inp", ("SECTION, ELSET", "SECTION, ORIENTATION=o, ELSET")),
     edited(materials, "block.inp", ("*ELASTIC", "*ELASTIC, TYPE=LAMINA")),
     edited(materials, "block.inp", ("2.1e11", "stiff")),
+    edited(materials, "block.inp", ("*DENSITY\n7850.\n", "*DENSITY\n7850.\n*DENSITY\n7800.\n")),
     edited(materials, "block.inp", ("7850.", "7850\0")),
     Case(
         lambda: with_files(lambda: file_materials("mesh.vtu", read_mesh("mesh.vtu")), {}),
