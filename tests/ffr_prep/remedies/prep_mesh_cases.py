@@ -46,7 +46,11 @@ OPENED = HEX.copy()
 OPENED[1] = np.where((HEX[1] >= 4) & (HEX[1] < 8), HEX[1] + 8, HEX[1])
 HINGED = np.vstack([PLAIN.points, PLAIN.points + np.array((1.0, 0.2, 0.1))])
 AT_CORNER = np.where(HEX + 12 == 12, 11, HEX + 12)
+CENTRE = PLAIN.points[HEX[0]].mean(axis=0)
+FOLDED = np.vstack([PLAIN.points, CENTRE + 0.3 * (PLAIN.points[HEX[0][4:]] - CENTRE)])
+TWICE = np.concatenate([HEX[0][:4], len(PLAIN.points) + np.arange(4)])
 MESHES = [
+    changed(points=FOLDED, blocks=blocks(np.vstack([HEX, TWICE]))),
     changed(blocks=()),
     changed(blocks=blocks(HEX, "hex9")),
     changed(points=moved(0, np.nan)),
