@@ -580,6 +580,7 @@ def test_abaqus_includes(deck, tmp_path):
         ("Lower, Upper", "Lower, Both", "refers to the set 'Both'"),
         ("Upper, S2", "77, S2", "side S2 of element 77"),
         ("9, 0., 0., 2.", "8, 0., 0., 2.", "node 8 is defined twice"),
+        ("20, 5, 6, 7, 8,", "10, 5, 6, 7, 8,", "element 10 is defined twice"),
         ("C3D8I", "C3D15", "volume elements of kind 'C3D15'"),
         ("*Mass, elset=Both", "*Instance, name=a, part=p\n1., 0., 0.", "assembly"),
         ("*Mass, elset=Both", "*Include, input=nowhere.inp", "nowhere.inp does not exist"),

@@ -104,6 +104,7 @@ DECKS = [
     of("block.inp", ("1, 0.0", "1, zero")),
     of("block.inp", ("1, 0.0", "2, 0.0")),
     of("block.inp", ("C3D8, ELSET=ALL\n1, 1,", "C3D8, ELSET=ALL\n1, 99,")),
+    of("block.inp", ("C3D8, ELSET=ALL\n1, 1,", "C3D8, ELSET=ALL\n2, 1,")),
     of("block.inp", ("*NODE", "*INCLUDE, INPUT=block.inp\n*NODE")),
     of("block.inp", ("*NODE", "*INSTANCE, NAME=a, PART=p\n1., 0., 0.\n*NODE")),
     of("block.inp", ("TYPE=C3D8", "TYPE=C3D6")),
