@@ -161,7 +161,7 @@ def test_points_in_cylindrical_and_turned_systems(tmp_path):
         ("CTETRA,9,1,1,2,3,4711", "GRID 4711, which the file does not define"),
         ("CPENTA,9,1,1,2,3,4,5,6", "volume elements of kind 'CPENTA'"),
         ("GRID,1,,0.,0.,0.", "GRID 1 is defined twice"),
-        ("CHEXA,1,7,1,2,3,4,5,6,7,8", "CHEXA 1 is defined twice"),
+        ("CTETRA,1,7,1,2,3,4", "CTETRA 1 is defined twice"),
         ("CORD2R,5,,0.,0.,0.,0.,0.,1.\n,1.,0.,0.\nCORD2R,5,,0.,0.,1.,0.,0.,2.\n,1.,0.,0.", "CORD2R 5 is defined twice"),
         ("GRID,4711,,0.,x,0.", "field 5 is 'x', where a number belongs"),
     ],
