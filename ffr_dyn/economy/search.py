@@ -25,7 +25,7 @@ import numpy as np
 from ffr_dyn.analyses.events import Event
 from ffr_dyn.analyses.forward import Beginning, Forward, forward
 from ffr_dyn.analyses.settings import Settings
-from ffr_dyn.consistency.assemble import Assembled, assemble
+from ffr_dyn.consistency.assemble import Assembled, assemble, body_doubts
 from ffr_dyn.economy.cache import Ledger, Tried
 from ffr_dyn.economy.checks import frequencies, stiffening_loads, stress_doubts
 from ffr_dyn.economy.contributions import Contributions, nothing, of_motion, of_omitted, own
@@ -343,13 +343,16 @@ def _finished(ledger: Ledger, found: Chosen, verify: bool | None) -> Economy:
         unmoved=unmoved(found.omitted, found.scales, names, ledger.policy),
         frequencies=frequencies(final, ledger.made(found.everything), found.everything, ledger.scene, ledger.policy),
         stiffening=stiffening_loads(final, ledger.policy),
-        notes=(
-            *final.result.attributes["notes"],
-            *stress_doubts(final, ledger.scene, ledger.of, found.limits),
-        ),
+        notes=(*_notes(ledger, final), *stress_doubts(final, ledger.scene, ledger.of, found.limits)),
         verification=verification,
         policy=ledger.policy,
     )
+
+
+def _notes(ledger: Ledger, final: Trial) -> list[str]:
+    """Those of the final run; on bodies those of the full model, since what the chosen one leaves out has an error here."""
+    own = body_doubts(final.scene)
+    return [*(note for note in final.result.attributes["notes"] if note not in own), *body_doubts(ledger.scene)]
 
 
 def _everything_in_space(found: Chosen, final: Trial) -> Choice:

@@ -46,8 +46,9 @@ def steady_stress_doubt(provenance: Mapping[str, Any]) -> str | None:
 def of_fewer_shapes(body: FlexibleBody, V: Array) -> Mapping[str, Any]:
     """The provenance of the body in the elastic coordinates p, q = V p, with V^T V = I and V^T Omega^2 V diagonal.
 
-    What its shapes leave out is then at most what all n shapes did and what they show beyond those of V (n, m), under the
-    same loads: of statics, held by the reference conditions, or by the first interface where these are the mean motion.
+    What its shapes leave out is then at most what all n shapes did and what they show beyond those of V (n, m), and at most
+    all there is and what those of V show, under the same loads: of statics, held by the reference conditions, or by the first
+    interface where these are the mean motion.
     """
     kept = body.provenance.get(STEADY_STRESS)
     if not kept or V.shape[1] == body.n:
@@ -58,8 +59,9 @@ def of_fewer_shapes(body: FlexibleBody, V: Array) -> Mapping[str, Any]:
     loads = _held_loads(body)
     all_shapes = loads / body.omega2[:, None]
     fewer = V @ ((V.T @ loads) / np.einsum("ia,i,ia->a", V, body.omega2, V)[:, None])
-    more = largest_von_mises(body.surface.stress @ (all_shapes - fewer))
-    left_out = [float(f"{x:.6g}") for x in np.array(kept["left_out"]) + more]
+    more, shown = (largest_von_mises(body.surface.stress @ q) for q in (all_shapes - fewer, fewer))
+    most = np.minimum(np.array(kept["left_out"]) + more, np.array(kept["largest"]) + shown)
+    left_out = [float(f"{x:.6g}") for x in most]
     return {**others, STEADY_STRESS: {**kept, "left_out": left_out}}
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import tomllib
 from contextlib import nullcontext
 from dataclasses import replace
 from functools import partial
@@ -59,7 +60,7 @@ from ffr_dyn.scene.drivers import Driver
 from ffr_dyn.scene.forces import Load
 from ffr_dyn.scene.joints import Joint
 from ffr_dyn.scene.scene import Body, Scene
-from ffr_dyn.scene.sensors import Measurement
+from ffr_dyn.scene.sensors import Measurement, StressMeasurement
 from ffr_dyn.scene_file.read import load_scene
 from ffr_dyn.scene_file.state_formula import StateFormula
 from ffr_dyn.scene_file.write import save_scene
@@ -585,10 +586,13 @@ def test_stress_that_the_shapes_of_the_full_model_lack_is_told():
     for lacks, told in ((0.0, False), (5e3, True)):  # Pa s^2, under spin about z'
         kept = {"left_out": [0.0] * 8 + [lacks] + [0.0] * 3, "largest": [1e4] * 12}
         made = replace(rod, model=replace(rod.model, provenance={**rod.model.provenance, "steady_stress": kept}))
-        scene = replace(lacking, bodies=tuple(made if one.name == "rod" else one for one in lacking.bodies))
+        bodies = tuple(made if one.name == "rod" else one for one in lacking.bodies)
+        scene = replace(lacking, bodies=bodies, measurements=(StressMeasurement("notch", "rod", (0.1, 0, 0)),))
         found = economise(scene, ["rod.stress=1e4"], end=0.02, output_step=0.001, verify=False)
         assert any("leave out up to" in note for note in found.notes) is told
         assert ("leave out up to" in as_text(found)) is told
+        assert found.choice.parts[1].count < rod.model.n  # what the chosen model lacks beside the full one is no note
+        assert any("leave out stress of its own inertia" in note for note in found.notes) is told
 
 
 # ---- report, advice, chart, command ---------------------------------------------------------------------------------
@@ -705,6 +709,29 @@ def test_the_command_keeps_parameters_and_events(tmp_path):
         assert how.analysis.events[0].stop
     assert '"0 * g"' in (tmp_path / "out.toml").read_text()
     assert how.end == 0.1
+
+
+def test_parameters_that_no_longer_act_as_they_did_are_left_out(tmp_path):
+    """The damping of a body is that of the modes of its model now; what stands with its parameter goes with it."""
+    scene = slider_crank(50.0)
+    settings = Settings(start=0.0, end=0.1, output_step=0.005, method=ROS2(0.0005), stabilisation=Projection())
+    save_scene(scene, settings, tmp_path / "in.toml")
+    tree = tomllib.loads((tmp_path / "in.toml").read_text())
+    text = (tmp_path / "in.toml").read_text()
+    damping = f"damping = {tree['bodies']['rod']['damping']}"
+    assert text.count(damping) == 2
+    text = text.replace(damping, 'damping = "2 * half"').replace("gravity = [0.0, 0.0, 0.0]", 'gravity = [0, "-g", 0]')
+    text = text.replace("O = [0.0, 0.0, 0.0]", 'O = ["0 * half", "0 * side", 0]')
+    text = text.replace("[ground]", '[parameters]\ng = 9.81\nunit = 1.0\nhalf = "0.005 * unit"\nside = 1.0\n\n[ground]')
+    (tmp_path / "in.toml").write_text(text)
+    arguments = ["economise", str(tmp_path / "in.toml"), "--output", "rod.stress=1%", "-o", str(tmp_path / "out.toml")]
+    done = CliRunner().invoke(cli, arguments)
+    assert done.exit_code == 0, done.output
+    assert "note     unit, half, side: not among the parameters" in done.output
+    made = load_scene(tmp_path / "out.toml", {"g": "3"})[0]
+    assert made.gravity.tolist() == [0.0, -3.0, 0.0]
+    with pytest.raises(InputError, match="there is no parameter 'half'"):
+        load_scene(tmp_path / "out.toml", {"half": "0.1"})
 
 
 def test_the_command_answers_a_wrong_output(tmp_path):
