@@ -29,7 +29,9 @@ from ffr_gallery.scene_set import (
     spin_up,
 )
 
+from ffr_dyn.analyses.forward import forward
 from ffr_dyn.analyses.integration import integrate
+from ffr_dyn.analyses.run import run
 from ffr_dyn.analyses.settings import Settings
 from ffr_dyn.cli import cli
 from ffr_dyn.consistency.assemble import assemble
@@ -57,7 +59,7 @@ from ffr_dyn.integrators import ROS2, ROS3
 from ffr_dyn.integrators.stabilisation import Projection
 from ffr_dyn.results.result import Result
 from ffr_dyn.scene.drivers import Driver
-from ffr_dyn.scene.forces import Load
+from ffr_dyn.scene.forces import JointFriction, JointSpring, JointStop, Load
 from ffr_dyn.scene.joints import Joint
 from ffr_dyn.scene.scene import Body, Scene
 from ffr_dyn.scene.sensors import Measurement, StressMeasurement
@@ -164,6 +166,25 @@ def test_the_error_of_a_step_comes_with_its_sign():
     true = difference(fine.values, finest.values)
     for estimated, wanted in zip(error_of(fine, coarse), true, strict=True):
         assert np.abs(estimated - wanted).max() < 0.3 * np.abs(wanted).max()
+
+
+def test_no_order_is_taken_for_granted_where_steps_jump_over_an_impact():
+    """An arm with a weight that falls on a stop: by third order a coarse step would be told a seventh of its error."""
+    arm = Body("arm", bar("arm", 0.4, rectangle(0.02, 0.006), ALUMINIUM), damping=0.02)
+    weight = Body("weight", block("weight", 0.05, 0.02), position=(0.4, 0, 0))
+    joints = Joint("hinge", "revolute", "ground.O", "arm.a"), Joint("grip", "fixed", "arm.b", "weight.pin")
+    forces = (
+        JointFriction("rub", "hinge", coulomb=0.02, creep=0.05),
+        JointStop("stop", "hinge", lower=-0.6, upper=2.0, stiffness=400.0, damping=1.5, entry=0.01),
+        JointSpring("spring", "hinge", stiffness=0.3),
+    )
+    scene = Scene((arm, weight), joints, forces=forces, ground={"O": (0, 0, 0)}, gravity=GRAVITY)
+    outputs = ("stop.torque", "arm.b.position")
+    found = economise(scene, outputs, end=0.5, output_step=0.005, tolerance=5e-2, verify=False)
+    true = forward(scene, end=0.5, output_step=0.005, method=ROS3(1e-4), check=False)
+    small = run(found.scene, found.settings)
+    off = [np.abs(small[name] - true[name]).max() for name in outputs]
+    assert (off <= found.limits).all()
 
 
 def test_the_least_run_takes_shorter_steps_until_it_comes_to_an_end():
