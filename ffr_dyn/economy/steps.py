@@ -302,7 +302,7 @@ def _orders(trial: Trial, off: Histories) -> list[int]:
     """The order of the method, for each output; 1 where two steps are so far apart that none has set in, as after an impact
     that they jump over (`ffr_dyn.consistency.step_error`)."""
     apart, sizes = largest(off), ranges(trial.values)
-    return [1 if far > FAR * size else order(trial) for far, size in zip(apart, sizes, strict=True)]
+    return [1 if far > FAR * size > 0 else order(trial) for far, size in zip(apart, sizes, strict=True)]
 
 
 def signed(trial: Trial, other: Trial) -> Histories:
