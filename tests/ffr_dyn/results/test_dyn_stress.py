@@ -345,7 +345,7 @@ def test_on_an_accelerated_base_what_is_missing_is_not_known():
     """A result does not keep the acceleration of its base, which loads the shapes as gravity does."""
     bar, hinge = relieved_bar(), (Joint("hinge", "revolute", "ground.O", "body.left"),)
     known = []
-    for base in ((0, 0, 0), (0, harmonic(5.0, 2.0), 0)):
+    for base in ((0, 0, 0), (0, harmonic(amplitude=5.0, frequency=2.0), 0)):
         scene = Scene((Body("body", bar),), hinge, ground={"O": (0, 0, 0)}, base_acceleration=base)
         known.append("left_out_stress" in described(scene))
     assert known == [True, False]
