@@ -444,7 +444,10 @@ def _doubled_plates(frame: Frame) -> list[Array]:
     places = {}
     plates = [*frame.triangles.tolist(), *frame.quadrilaterals.tolist()]
     leaving = [
-        ((min(edge), max(edge)), (e, _inward(*frame.points[list(edge)], frame.points[nodes].mean(axis=0))))
+        (
+            (min(edge), max(edge)),
+            (e, _inward(frame.points[edge[0]], frame.points[edge[1]], frame.points[nodes].mean(axis=0))),
+        )
         for e, nodes in enumerate(plates)
         for edge in zip(nodes, (*nodes[1:], nodes[0]), strict=True)
     ]
