@@ -59,7 +59,7 @@ def economise(
     from ffr_dyn.economy.report import as_text, write_report
     from ffr_dyn.economy.search import economise as search
     from ffr_dyn.scene_file.read import load_scene
-    from ffr_dyn.scene_file.write import save_changed
+    from ffr_dyn.scene_file.write import lost_parameters, save_changed
 
     loaded, given = load_scene(scene, assignments(parameters))
     analysis = given.analysis if isinstance(given.analysis, Forward) else Forward()
@@ -83,9 +83,13 @@ def economise(
         begin=analysis.begin,
         tell=lambda stage: click.echo(f"... {stage}", err=True),
     )
-    save_changed(found.scene, found.settings, target, scene, assignments(parameters))
+    fixed = lost_parameters(scene, save_changed(found.scene, found.settings, target, scene, assignments(parameters)))
     write_report(found, report)
     if chart is not None:
         draw(found, chart)
     click.echo(as_text(found))
+    if fixed:
+        click.echo(
+            f"note     {', '.join(fixed)}: not among the parameters of the scene, as what they change is another now"
+        )
     click.echo(f"scene    {target}\nreport   {report}")

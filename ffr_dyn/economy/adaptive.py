@@ -20,7 +20,7 @@ from ffr_dyn.closing.positions import close_positions, close_velocities
 from ffr_dyn.consistency.assemble import assemble
 from ffr_dyn.economy.contributions import effects_of
 from ffr_dyn.economy.model_choice import Choice, Part, full
-from ffr_dyn.economy.outputs import Output, Probe, as_output, limits, probe, ranges
+from ffr_dyn.economy.outputs import Output, Probe, as_output, check_meaning, limits, probe, ranges
 from ffr_dyn.economy.policy import DEFAULT, Policy
 from ffr_dyn.economy.residual_estimate import Samples, driven, followed, samples
 from ffr_dyn.economy.run import Made, Span, Trial, make, run, states
@@ -29,7 +29,7 @@ from ffr_dyn.integrators.stabilisation import Projection, Stabilisation
 from ffr_dyn.results.result import Axis, Quantity, Result
 from ffr_dyn.scene.described import described
 from ffr_dyn.scene.scene import Body, Scene
-from ffr_dyn.variants.mean_axis import with_mean_axis_bodies
+from ffr_dyn.variants.mean_axis import in_new_frames
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 
@@ -99,8 +99,9 @@ def adaptive_forward(
 
     >>> result = fd.adaptive_forward(scene, ["rod.tip.position"], end=0.5, output_step=1e-3)
     """
-    span, scene = Span(start, end, output_step, stabilisation), with_mean_axis_bodies(scene)
+    span, (scene, moved) = Span(start, end, output_step, stabilisation), in_new_frames(scene)
     of = probe(assemble(scene, time=start), [as_output(one, tolerance) for one in outputs], policy)
+    check_meaning(of, scene, moved)
     everything = replace(full(scene, method, divisions), plane=scene.plane)
     models = _Models(span)
     bound = _bound(scene, everything, models, of, policy)

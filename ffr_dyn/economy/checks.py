@@ -16,10 +16,15 @@ from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.consistency.evaluation import evaluate, evaluated_mass_matrix, evaluator
 from ffr_dyn.consistency.second_order_loads import loads_at
 from ffr_dyn.economy.model_choice import Choice, bases_between
+from ffr_dyn.economy.outputs import STRESS, Probe
 from ffr_dyn.economy.policy import DEFAULT, Policy
 from ffr_dyn.economy.residual_estimate import elastic_columns, lift
 from ffr_dyn.economy.run import Made, Trial, states
+from ffr_dyn.functions.time_functions import evaluate as evaluate_function
+from ffr_dyn.results.result import Result
+from ffr_dyn.results.stress_error import missing_stress
 from ffr_dyn.scene.scene import Body, Scene
+from ffr_prep.body import left_out_stress
 from ffr_prep.common.arrays import Array
 
 INERTIAL = (
@@ -40,6 +45,28 @@ class Frequency:
     def shift(self) -> float:
         """Relative difference."""
         return self.model / self.everything - 1.0
+
+
+def stress_doubts(final: Trial, original: Scene, of: Probe, limits: Array) -> tuple[str, ...]:
+    """Notes on outputs of stress that lack more than their tolerance in the full model already: what its shapes leave out."""
+    bodies = {f"{body.name}.{STRESS}": body for body in original.bodies}
+    asked = [(output.name, limit) for output, limit in zip(of.outputs, limits, strict=True) if output.name in bodies]
+    missing = [(name, limit, _missing(final.result, original, bodies[name])) for name, limit in asked]
+    return tuple(
+        f"output {name!r}: the shapes of the full model leave out up to {lacks:.2g} Pa of the stress of its own inertia, "
+        f"{lacks / limit:.2g} tolerances, which no error here counts; add the shapes of such loads "
+        "(`--method craig-bampton --method inertia-relief`; InertiaRelief() in a Union)"
+        for name, limit, lacks in missing
+        if lacks > limit
+    )
+
+
+def _missing(result: Result, original: Scene, body: Body) -> float:
+    left_out = left_out_stress(body.model.provenance)
+    if not left_out:
+        return 0.0
+    base = [[evaluate_function(f, t)[0] for f in original.base_acceleration] for t in result.time]
+    return missing_stress(result, body.name, np.array(left_out), original.gravity - np.array(base)) or 0.0
 
 
 def frequencies(final: Trial, made: Made, everything: Choice, original: Scene, policy: Policy) -> tuple[Frequency, ...]:

@@ -202,7 +202,7 @@ def _changed(seen: Samples, rows: Array, shift: Array, rates: Array) -> Record:
 
 def _outputs(seen: Samples, record: Record, scene: Scene, of: Probe) -> tuple[Array, ...]:
     """Per output (K, k) at recorded states, which follow one another in no order."""
-    quantities, _ = measure(View(seen.system, record), {}, selected(seen.system, needed(of, scene)))
+    quantities, _ = measure(View(seen.system, record), {}, selected(seen.system, needed(of, seen.system)))
     return histories(of, scene, Result(np.arange(float(len(record.time))), quantities))
 
 

@@ -2,26 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from typing import Any
 
 import numpy as np
 
+from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.consistency.assemble import Assembled
 from ffr_dyn.economy.policy import DEFAULT, Policy
+from ffr_dyn.functions.formula import names_in
 from ffr_dyn.results.quantities import catalogue
 from ffr_dyn.results.result import Result
 from ffr_dyn.results.stress import tensors
+from ffr_dyn.scene.force_kinds import forces_of
+from ffr_dyn.scene.parts import wholes
 from ffr_dyn.scene.scene import Scene
+from ffr_dyn.scene.sensors import Measurement
 from ffr_dyn.scene.stress_sensors import von_mises
 from ffr_dyn.scene.surfaces import surface_of
+from ffr_dyn.scene_file.schema import formula_of
+from ffr_dyn.scene_file.state_formula import StateFormula
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 
 STRESS = "stress"
-ELASTIC = ("displacement", "q", "q_dot", "q_ddot")  # quantities that a rigid body does not have: zero
+COORDINATES = ("q", "q_dot", "q_ddot")
+FRAME = ("R", "p", "v", "omega_bar", "a", "alpha_bar")
 
 
 @dataclass(frozen=True)
@@ -113,6 +121,49 @@ def _found(everything: Mapping[str, Any], scene: Scene, name: str) -> tuple[str,
     raise InputError(f"output {name!r} is none of the scene's quantities or their components; {hint}")
 
 
+def check_meaning(of: Probe, scene: Scene, moved: Collection[str]) -> None:
+    """InputError for outputs and forces that would mean something else in a smaller model: those of elastic coordinates, and
+    of the frames of bodies in `moved`, by name, whose model has another frame than the scene."""
+    seen_from, parts = _frames(scene), {name: [part.name for part in of] for name, of in wholes(scene.bodies).items()}
+    for output, quantity in zip(of.outputs, of.quantities, strict=True):
+        owner, label = quantity.partition(".")[0], quantity.rpartition(".")[2]
+        if label in COORDINATES and output.name.rpartition(".")[2] != STRESS:
+            raise InputError(
+                f"output {output.name!r}: elastic coordinates are those of a model, and a smaller one has others; ask for "
+                f"what they do, such as the position of a marker of {owner!r}"
+            )
+        body = seen_from.get(quantity, owner if label in (*FRAME, "displacement") else "")
+        if body in moved or any(part in moved for part in parts.get(body, ())):
+            raise InputError(
+                f"output {output.name!r} is seen from the frame of body {body!r}, and a smaller model has the frame of its "
+                "mean motion: ask for positions, or for a measurement between markers in the axes of another body; or bring "
+                "the body into that frame (ffr-prep convert --reference mean-axis)"
+            )
+    for force in forces_of(scene):
+        _check_force(force.name, formula_of(force), moved)
+
+
+def _frames(scene: Scene) -> dict[str, str]:
+    """The bodies in whose axes quantities are that do not have their names."""
+    found = {f"measured.{of.name}": of.axes for of in scene.measurements if isinstance(of, Measurement)}
+    for joint in scene.joints:
+        found |= {f"{joint.name}.{what}_i": joint.i.partition(".")[0] for what in ("force", "moment")}
+    return found
+
+
+def _check_force(name: str, formula: Any, moved: Collection[str]) -> None:
+    """InputError for a formula that reads elastic coordinates, or the rotation of a frame that the model does not have."""
+    if not isinstance(formula, StateFormula):
+        return
+    for read in (read for expression in formula.expressions for read in names_in(expression)):
+        owner, _, what = read.rpartition(".")[0].rpartition(".")
+        if what in COORDINATES or (what in FRAME and owner in moved):
+            raise InputError(
+                f"force {name!r} depends on {read!r}, which is another number in a smaller model; let it depend on markers "
+                "and joints"
+            )
+
+
 def _check_stress(scene: Scene, name: str) -> None:
     bodies = {body.name: body.model for body in scene.bodies}
     if name not in bodies:
@@ -124,15 +175,10 @@ def _check_stress(scene: Scene, name: str) -> None:
         )
 
 
-def needed(of: Probe, scene: Scene) -> tuple[str, ...]:
-    """The quantities that a run of this model has to keep."""
-    rigid = {body.name for body in scene.bodies if body.model.n == 0}
-    there = [name for name in of.quantities if not _is_elastic(name, rigid)]
-    return tuple(dict.fromkeys([*there, "constraint.position"]))
-
-
-def _is_elastic(quantity: str, rigid: set[str]) -> bool:
-    return quantity.partition(".")[0] in rigid and quantity.rpartition(".")[2] in ELASTIC
+def needed(of: Probe, system: System) -> tuple[str, ...]:
+    """The quantities that a run of this model has to keep: what a rigid body does not have is zero."""
+    known = catalogue(system)
+    return tuple(dict.fromkeys([*(name for name in of.quantities if name in known), "constraint.position"]))
 
 
 def histories(of: Probe, scene: Scene, result: Result) -> tuple[Array, ...]:

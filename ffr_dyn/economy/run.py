@@ -125,7 +125,7 @@ def run(
 
     Raises ComputationError as `forward` does, and where the outputs are no longer finite.
     """
-    kept = (*needed(of, made.scene), *_states(made.scene), *outputs)
+    kept = (*needed(of, made.assembled.system), *_states(made.scene), *outputs)
     result = simulated(made, choice, span, kept, method=method, say=say)
     with np.errstate(over="ignore", invalid="ignore"):  # told below
         values = histories(of, made.scene, result)

@@ -25,13 +25,13 @@ import numpy as np
 from ffr_dyn.analyses.events import Event
 from ffr_dyn.analyses.forward import Beginning, Forward, forward
 from ffr_dyn.analyses.settings import Settings
-from ffr_dyn.consistency.assemble import Assembled, assemble
+from ffr_dyn.consistency.assemble import Assembled, assemble, body_doubts
 from ffr_dyn.economy.cache import Ledger, Tried
-from ffr_dyn.economy.checks import frequencies, stiffening_loads
+from ffr_dyn.economy.checks import frequencies, stiffening_loads, stress_doubts
 from ffr_dyn.economy.contributions import Contributions, nothing, of_motion, of_omitted, own
 from ffr_dyn.economy.inertia_terms import TermEffect
 from ffr_dyn.economy.model_choice import Choice, applied
-from ffr_dyn.economy.outputs import Output, Probe, as_output, difference, largest, probe, ranges, total
+from ffr_dyn.economy.outputs import Output, Probe, as_output, check_meaning, difference, largest, probe, ranges, total
 from ffr_dyn.economy.outputs import limits as limits_of
 from ffr_dyn.economy.policy import DEFAULT, Policy
 from ffr_dyn.economy.result import Economy, Verification
@@ -42,7 +42,7 @@ from ffr_dyn.economy.steps import Stepped, chosen_step
 from ffr_dyn.economy.verification import apart, reference_cost, sharpened, unheard, verified
 from ffr_dyn.integrators.stabilisation import Projection, Stabilisation
 from ffr_dyn.scene.scene import Scene
-from ffr_dyn.variants.mean_axis import with_mean_axis_bodies
+from ffr_dyn.variants.mean_axis import in_new_frames
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError, InputError
 
@@ -103,12 +103,13 @@ def economise(
 
     >>> found = fd.economise(scene, ["rod.tip.position"], end=0.5, output_step=1e-3, tolerance=1e-3)
     """
-    span, scene = Span(start, end, output_step, stabilisation, begin), with_mean_axis_bodies(scene)
+    span, (scene, moved) = Span(start, end, output_step, stabilisation, begin), in_new_frames(scene)
     tell("assemble")
     assembled = assemble(scene, time=start)
     if any(event.stop for event in events):
         span = _ended(scene, assembled, span, events)
     of = probe(assembled, [as_output(one, tolerance) for one in outputs], policy)
+    check_meaning(of, scene, moved)
     ledger = Ledger(scene, span, of, tell, policy)
     stiff = started(ledger, assembled.system.scene)
     limits = stiff.limits
@@ -116,7 +117,18 @@ def economise(
     found = None if omitted is None else _surely_rigid(ledger, stiff, omitted)
     found = _beside_everything(ledger, stiff, omitted, verify) if found is None else found
     economy = _finished(ledger, found, verify)
-    return replace(economy, settings=replace(economy.settings, end=end, analysis=Forward(tuple(events), begin=begin)))
+    settings = replace(economy.settings, end=end, analysis=Forward(tuple(events), begin=begin))
+    return replace(economy, settings=settings, notes=(*economy.notes, *_new_frames(economy, moved)))
+
+
+def _new_frames(found: Economy, moved: Sequence[str]) -> list[str]:
+    flexible = ", ".join(repr(body.name) for body in found.scene.bodies if body.name in moved and body.model.n)
+    if not flexible:
+        return []
+    return [
+        f"in this model the frame of {flexible} is that of its mean motion, from which its position, rotation, elastic "
+        "coordinates and displacements are seen, and what is measured in its axes"
+    ]
 
 
 def _ended(scene: Scene, assembled: Assembled, span: Span, events: Sequence[Event]) -> Span:
@@ -331,10 +343,16 @@ def _finished(ledger: Ledger, found: Chosen, verify: bool | None) -> Economy:
         unmoved=unmoved(found.omitted, found.scales, names, ledger.policy),
         frequencies=frequencies(final, ledger.made(found.everything), found.everything, ledger.scene, ledger.policy),
         stiffening=stiffening_loads(final, ledger.policy),
-        notes=tuple(final.result.attributes["notes"]),
+        notes=(*_notes(ledger, final), *stress_doubts(final, ledger.scene, ledger.of, found.limits)),
         verification=verification,
         policy=ledger.policy,
     )
+
+
+def _notes(ledger: Ledger, final: Trial) -> list[str]:
+    """Those of the final run; on bodies those of the full model, since what the chosen one leaves out has an error here."""
+    own = body_doubts(final.scene)
+    return [*(note for note in final.result.attributes["notes"] if note not in own), *body_doubts(ledger.scene)]
 
 
 def _everything_in_space(found: Chosen, final: Trial) -> Choice:

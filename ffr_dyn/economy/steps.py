@@ -13,10 +13,11 @@ from typing import Any
 
 import numpy as np
 
+from ffr_dyn.consistency.step_error import FAR
 from ffr_dyn.economy.cache import Ledger
 from ffr_dyn.economy.cost import STAGES
 from ffr_dyn.economy.model_choice import Choice
-from ffr_dyn.economy.outputs import difference, largest
+from ffr_dyn.economy.outputs import difference, largest, ranges
 from ffr_dyn.economy.policy import DEFAULT, Policy
 from ffr_dyn.economy.run import Span, Trial, rings
 from ffr_dyn.integrators import CONTROLLED, METHODS, RK4, Integrator
@@ -122,8 +123,9 @@ def _from_two_rows(ledger: Ledger, trial: Trial) -> Histories | None:
         return None
     if wide is None:
         return None
-    gain = 2.0 ** order(trial) - 1
-    return tuple(_on_all_rows((w - v[::2]) / gain) for w, v in zip(wide.values, trial.values, strict=True))
+    off = tuple(w - v[::2] for w, v in zip(wide.values, trial.values, strict=True))
+    orders = _orders(trial, off)
+    return tuple(_on_all_rows(d / (2.0**p - 1)) for d, p in zip(off, orders, strict=True))
 
 
 def _on_all_rows(values: Array) -> Array:
@@ -292,16 +294,24 @@ def order_of(choice: Choice) -> int:
 
 def error_of(fine: Trial, coarse: Trial) -> Histories:
     """(T, k) per output: the signed error of the finer of two runs of one method."""
-    ratio = fine.choice.divisions / coarse.choice.divisions
-    return tuple(d / (ratio ** order(fine) - 1) for d in difference(coarse.values, fine.values))
+    ratio, off = fine.choice.divisions / coarse.choice.divisions, difference(coarse.values, fine.values)
+    return tuple(d / (ratio**p - 1) for d, p in zip(off, _orders(fine, off), strict=True))
+
+
+def _orders(trial: Trial, off: Histories) -> list[int]:
+    """The order of the method, for each output; 1 where two steps are so far apart that none has set in, as after an impact
+    that they jump over (`ffr_dyn.consistency.step_error`)."""
+    apart, sizes = largest(off), ranges(trial.values)
+    return [1 if far > FAR * size > 0 else order(trial) for far, size in zip(apart, sizes, strict=True)]
 
 
 def signed(trial: Trial, other: Trial) -> Histories:
     """The error of `trial`, from a run of the same method with a shorter or a longer step."""
     if other.choice.divisions < trial.choice.divisions:
         return error_of(trial, other)
-    gain = (other.choice.divisions / trial.choice.divisions) ** order(trial)
-    return tuple(gain * e for e in error_of(other, trial))
+    ratio = other.choice.divisions / trial.choice.divisions
+    orders = _orders(other, difference(trial.values, other.values))
+    return tuple(ratio**p * e for p, e in zip(orders, error_of(other, trial), strict=True))
 
 
 def share(error: Histories, limit: Array) -> float:

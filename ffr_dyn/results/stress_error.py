@@ -16,7 +16,8 @@ from ffr_prep.common.arrays import Array
 
 
 def stress_error(result: Result, body: str) -> float | None:
-    """The largest von Mises stress [Pa] that is missing on a body at any time of a result; None where that is not known.
+    """The largest von Mises stress [Pa] that is missing on a body at any time of a result; None where that is not known, as
+    on a base that is accelerated.
 
     body : by its name, of a body in parts by that of the whole: then that of the part with the largest
 
@@ -24,11 +25,17 @@ def stress_error(result: Result, body: str) -> float | None:
     """
     names = result.attributes.get("parts", {}).get(body, [body])
     known = result.attributes.get("left_out_stress", {})
-    found = [_largest(result, name, np.array(known[name])) for name in names if name in known]
+    gravity = np.array(result.attributes.get("gravity", np.zeros(3)), float)
+    found = [missing_stress(result, name, np.array(known[name]), gravity) for name in names if name in known]
     return max((error for error in found if error is not None), default=None)
 
 
-def _largest(result: Result, body: str, left_out: Array) -> float | None:
+def missing_stress(result: Result, body: str, left_out: Array, gravity: Array) -> float | None:
+    """The largest von Mises stress [Pa] that is missing on a body at any time of a result; None without its motion.
+
+    left_out : (12,) under unit accelerations (`ffr_prep.body.left_out_stress`)
+    gravity  : (3,) or (T, 3) [m/s^2], less the acceleration of the base
+    """
     needed = [f"{body}.{key}" for key in ("p", "v", "omega_bar")]
     if not result.time.size or needed[0] not in result.quantities:
         return None
@@ -36,7 +43,6 @@ def _largest(result: Result, body: str, left_out: Array) -> float | None:
     v, omega = (result[name] if name in result.quantities else still for name in needed[1:])
     p = result[needed[0]]
     axes = rotation_matrix(p / np.linalg.norm(p, axis=1, keepdims=True))
-    gravity = np.array(result.attributes.get("gravity", np.zeros(3)), float)
     origin = np.einsum("tji,tj->ti", axes, _rate(result.time, v) - gravity)
     products = np.stack([omega[:, a] * omega[:, b] for a, b in PRODUCTS], axis=1)
     accelerations = np.hstack([origin, _rate(result.time, omega), products])

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ffr_dyn.functions.time_functions import is_zero
 from ffr_dyn.scene.couplings import Coupling, coupled
 from ffr_dyn.scene.drivers import Driver, PointDriver
 from ffr_dyn.scene.force_kinds import forces_of
@@ -25,14 +26,15 @@ def described(scene: Scene) -> dict[str, Any]:
     """Plain JSON values: the title; the `mass` [kg] of all bodies and a `length` [m], the largest radius of gyration about
     the origin of a body's frame, which tell what is small; the parts of bodies by the name of the whole; places (3,) of the
     ground's points [m]; by the name of a joint, driver, coupling or force the markers `at` which it is, and what of it is
-    drawn; and of bodies with stress `gravity` and what their shapes leave out (`ffr_prep.body.left_out_stress`).
+    drawn; and of bodies with stress, where the base rests, `gravity` and what their shapes leave out
+    (`ffr_prep.body.left_out_stress`).
     """
     parts = {name: [part.name for part in of] for name, of in wholes(scene.bodies).items()}
     ground = {name: at.tolist() for name, at in scene.ground.items()}
     sizes = {"mass": sum(body.model.mass for body in scene.bodies), "length": _length(scene)}
     stress = {body.name: of for body in scene.bodies if (of := left_out_stress(body.model.provenance))}
     found: dict[str, Any] = {**sizes, "parts": parts, "ground": ground, "connections": _connections(scene)}
-    if stress:
+    if stress and all(is_zero(f) for f in scene.base_acceleration):  # which a result does not keep
         found |= {"gravity": [float(g) for g in scene.gravity], "left_out_stress": stress}
     return {"title": scene.name} | {key: value for key, value in found.items() if value}
 

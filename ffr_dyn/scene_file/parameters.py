@@ -14,7 +14,7 @@ from ffr_prep.common.errors import InputError
 from ffr_prep.common.units import split_quantity, to_si
 
 _REFERENCE = re.compile(r"\$\{\s*([^{}]*?)\s*\}")
-_NAME = re.compile(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)*")
+NAME = re.compile(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)*")  # of a parameter
 
 
 def flattened(table: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
@@ -25,7 +25,7 @@ def flattened(table: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
         if isinstance(value, dict):
             found |= flattened(value, f"{name}.")
             continue
-        if not _NAME.fullmatch(name) or name in ("t", *CONSTANTS, *FUNCTIONS):
+        if not NAME.fullmatch(name) or name in ("t", *CONSTANTS, *FUNCTIONS):
             raise InputError(
                 f"parameters.{name}: cannot be a parameter's name: use letters, digits and '_'; "
                 f"t, {', '.join((*CONSTANTS, *FUNCTIONS))} are taken"

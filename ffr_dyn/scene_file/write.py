@@ -29,6 +29,7 @@ from ffr_dyn.integrators.stabilisation import Baumgarte, Projection, Stabilisati
 from ffr_dyn.scene.parts import as_declared, cut_joints
 from ffr_dyn.scene.scene import Body, Scene
 from ffr_dyn.scene_file.assignments import assigned
+from ffr_dyn.scene_file.parameters import NAME, flattened
 from ffr_dyn.scene_file.read import load_scene
 from ffr_dyn.scene_file.schema import Kind, fields_of_motion, formula_of, keys_of, nested_kinds, tables
 from ffr_dyn.scene_file.source import PATHS, read_source
@@ -69,7 +70,8 @@ def save_changed(
     """Write a scene file as `save_scene` does, with the parameters of the file that the scene has been made from.
 
     What the change has left as it was stands as in that file, in formulas of the parameters, so that these may be changed
-    still.
+    still. Parameters that something depended on which is changed would now act in part alone, or not at all: they are left
+    out, with their values where they stood.
 
     given : values, as text, of parameters in place of those in the original file
     """
@@ -81,12 +83,60 @@ def save_changed(
     text = path.read_text(encoding="utf-8")
     plain = tomllib.loads(text)
     before = tomllib.loads(to_toml(first, how, {body.name: "" for body in first.bodies if not _is_plain(body.model)}))
-    tree = _as_given(plain, before, _moved(_without_marked(declared), path.parent))
-    _replace(path, "\n".join(_lines({"parameters": parameters, **tree}, ())) + "\n")
+    text_of_all = _moved(declared, path.parent)
+    lost = _fixed(parameters, text_of_all, _as_given(plain, before, _without_marked(text_of_all)))
+    kept = {name: value for name, value in parameters.items() if name not in lost}
+    tree = _as_given(plain, before, _free_of(_without_marked(text_of_all), plain, lost))
+    _replace(path, "\n".join(_lines({**({"parameters": kept} if kept else {}), **tree}, ())) + "\n")
     files = {name: entry["file"] for name, entry in plain["bodies"].items() if "file" in entry}
     if tomllib.loads(to_toml(*load_scene(path), files)) != plain:
         _replace(path, text)  # what is written must be the scene, with its formulas or without
     return path
+
+
+def lost_parameters(original: str | Path, written: str | Path) -> list[str]:
+    """Names of the parameters of a scene file that another one, made of it, does not have."""
+    before, after = (flattened(read_source(Path(path)).tree.get("parameters", {})) for path in (original, written))
+    return [name for name in before if name not in after]
+
+
+def _fixed(parameters: Mapping[str, Any], given: dict[str, Any], written: dict[str, Any]) -> set[str]:
+    """The parameters of entries that are no longer written as they were given, and those that stand with them."""
+    left, entries = dict(_entries(written)), list(_entries(given))
+    together = [_names(part) & parameters.keys() for _, part in entries]
+    together += [{name, *(_names(value) & parameters.keys())} for name, value in parameters.items()]
+    lost = _names([part for keys, part in entries if keys not in left or left[keys] != part]) & parameters.keys()
+    while more := set().union(*(names for names in together if names & lost)) - lost:
+        lost |= more
+    return lost
+
+
+def _entries(tree: Any, keys: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], Any]]:
+    """What tables hold, by their keys."""
+    if keys in (("chart",), ("outputs",), ("name",), ("include",)):  # no part of the motion
+        return
+    if isinstance(tree, dict):
+        for key, item in tree.items():
+            yield from _entries(item, (*keys, key))
+    else:
+        yield keys, tree
+
+
+def _names(value: Any) -> set[str]:
+    """Words in the texts of an entry that may be parameters."""
+    if isinstance(value, str):
+        return {match[0] for match in NAME.finditer(value)}
+    items = value.values() if isinstance(value, dict) else value if isinstance(value, list) else ()
+    return set().union(*map(_names, items), ())
+
+
+def _free_of(text: Any, plain: Any, lost: set[str]) -> Any:
+    """A tree as it was given, with numbers for what depends on some parameters."""
+    if not _names(text) & lost:
+        return text
+    if isinstance(text, dict) and isinstance(plain, dict):
+        return {key: _free_of(item, plain[key], lost) for key, item in text.items() if key in plain}
+    return plain
 
 
 def _replace(path: Path, text: str) -> None:

@@ -120,6 +120,16 @@ def with_mean_axis_bodies(scene: Scene) -> Scene:
     return replace(converted, bodies=tuple(replace(body, frame=None) for body in converted.bodies))
 
 
+def in_new_frames(scene: Scene) -> tuple[Scene, list[str]]:
+    """`with_mean_axis_bodies`, and the names of the bodies whose frame is another one there.
+
+    Raises InputError as `in_mean_axis_frames`.
+    """
+    made = with_mean_axis_bodies(scene)
+    pairs = zip(scene.bodies, made.bodies, strict=True)
+    return made, [new.name for old, new in pairs if new.model is not old.model]
+
+
 def _is_mean_axis(model: FlexibleBody) -> bool:
     """Whether a body is in its mean-axis form already: what vanishes there is zero, and no rounding."""
     assert model.stiffening is not None

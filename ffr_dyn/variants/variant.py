@@ -27,7 +27,7 @@ import numpy as np
 from ffr_dyn.scene.force_kinds import in_bases, modal_fields
 from ffr_dyn.scene.scene import INERTIA_TERMS, Body, Scene, used_interfaces
 from ffr_dyn.variants.condensation import statically_complete
-from ffr_prep.body import FlexibleBody, recombined, truncated
+from ffr_prep.body import FlexibleBody, of_fewer_shapes, recombined, truncated
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 
@@ -77,6 +77,7 @@ def with_basis(model: FlexibleBody, V: Array) -> FlexibleBody:
         surface=model.surface and recombined(model.surface, V, model.surface.Phi @ V),
         stiffening=None if stiffening is None else np.einsum("ia,lij,jb->lab", V, stiffening, V, optimize=True),
         damping=None if model.damping is None else V.T @ model.damping @ V,
+        provenance=of_fewer_shapes(model, V),
     )
 
 

@@ -11,8 +11,9 @@ The numbered invariants I1...I9 and Shabana's S_bar family are read-only views o
 """
 
 from ffr_prep.body.accelerations import PRODUCTS
-from ffr_prep.body.constructors import check_point, recombined, rigid_body, truncated, with_point
+from ffr_prep.body.constructors import check_point, recombined, rigid_body, with_point
 from ffr_prep.body.damping import Damping, damped, with_damping
+from ffr_prep.body.fewer_modes import truncated
 from ffr_prep.body.file import content_hash, load_body, save_arrays, save_body, surface_arrays, surface_of
 from ffr_prep.body.frame_change import interface_motions, mass_of_motions
 from ffr_prep.body.mean_axis import FrameMarker, MeanAxisForm, idle_loads, mean_axis_form
@@ -43,7 +44,13 @@ from ffr_prep.body.second_order import (
     some_points,
     values,
 )
-from ffr_prep.body.steady_stress import STEADY_STRESS, left_out_stress, steady_stress_doubt
+from ffr_prep.body.steady_stress import (
+    STEADY_STRESS,
+    largest_von_mises,
+    left_out_stress,
+    of_fewer_shapes,
+    steady_stress_doubt,
+)
 from ffr_prep.body.units_doubt import units_doubts
 
 __all__ = [
@@ -73,6 +80,7 @@ __all__ = [
     "idle_loads",
     "immovable",
     "interface_motions",
+    "largest_von_mises",
     "left_out_stress",
     "linear_surface",
     "load_body",
@@ -80,6 +88,7 @@ __all__ = [
     "mean_axis_form",
     "mesh_doubt",
     "mesh_errors_of",
+    "of_fewer_shapes",
     "pair_values",
     "reach_of",
     "recombined",

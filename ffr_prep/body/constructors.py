@@ -1,4 +1,4 @@
-"""Bodies from numbers and from other bodies: rigid ones, fewer modes, other coordinates, one more point."""
+"""Bodies from numbers and from other bodies: rigid ones, other coordinates, one more point."""
 
 from __future__ import annotations
 
@@ -83,36 +83,6 @@ def check_point(what: str, name: str, at: ArrayLike) -> None:
         )
     if not np.abs(np.asarray(at, float)).max() < _MOST:
         raise BodyError(f"{what} {name!r} is at {np.asarray(at, float).tolist()} m: coordinates are below {_MOST:g} m")
-
-
-def truncated(body: FlexibleBody, modes: int | Array) -> FlexibleBody:
-    """The body with only its first ``modes`` elastic coordinates, or those of the indices (k,) in `modes`; so are its parts.
-
-    Raises BodyError for a mode that does not exist or is listed twice.
-
-    >>> small = fd.truncated(body, 4)
-    """
-    if np.ndim(modes) == 0 and not 0 <= int(modes) <= body.n:
-        raise BodyError(f"body {body.name!r} has {body.n} modes; asked to keep the first {int(modes)}")
-    keep = np.arange(int(modes)) if np.ndim(modes) == 0 else np.asarray(modes, int)
-    unknown = keep[(keep < 0) | (keep >= body.n)]
-    if unknown.size or np.unique(keep).size < keep.size:
-        raise BodyError(
-            f"body {body.name!r} has {body.n} modes, counted from 0; asked to keep {keep.tolist()}: each must exist "
-            "and be named once"
-        )
-    return replace(
-        body,
-        P_dm=body.P_dm[:, keep],
-        rP_dm=body.rP_dm[:, :, keep],
-        PP_dm=body.PP_dm[:, :, keep][:, :, :, keep],
-        omega2=body.omega2[keep],
-        interfaces=tuple(replace(i, phi_t=i.phi_t[:, keep], phi_r=i.phi_r[:, keep]) for i in body.interfaces),
-        surface=body.surface and recombined(body.surface, np.eye(body.n)[:, keep], body.surface.Phi[:, :, keep]),
-        stiffening=None if body.stiffening is None else body.stiffening[:, keep][:, :, keep],
-        damping=None if body.damping is None else body.damping[np.ix_(keep, keep)],
-        parts=tuple(truncated(part, modes if np.ndim(modes) else min(int(modes), part.n)) for part in body.parts),
-    )
 
 
 def recombined(surface: Surface, V: Array, Phi: Array) -> Surface:

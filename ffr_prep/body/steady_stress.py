@@ -5,8 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
+
+from ffr_prep.body.accelerations import INERTIAL
+from ffr_prep.body.frame_change import interface_motions, loads_on_motions
+from ffr_prep.body.reduced import FlexibleBody
+from ffr_prep.common.arrays import Array
+
 STEADY_STRESS = "steady_stress"  # of the provenance
 TOLD = 0.1  # of the largest stress under a load, from where on it is told unasked
+_MEAN = 1e-9  # of the root of the mass: what moves the centre of mass in a frame of the mean motion
 _LOADS = (
     *(f"weight or acceleration along {axis}" for axis in "xyz"),
     *(f"angular acceleration about {axis}" for axis in "xyz"),
@@ -33,3 +41,42 @@ def steady_stress_doubt(provenance: Mapping[str, Any]) -> str | None:
         f"{_LOADS[worst]}; add the shapes of such loads (`--method craig-bampton --method inertia-relief`; "
         "InertiaRelief() in a Union)"
     )
+
+
+def of_fewer_shapes(body: FlexibleBody, V: Array) -> Mapping[str, Any]:
+    """The provenance of the body in the elastic coordinates p, q = V p, with V^T V = I and V^T Omega^2 V diagonal.
+
+    What its shapes leave out is then at most what all n shapes did and what they show beyond those of V (n, m), and at most
+    all there is and what those of V show, under the same loads: of statics, held by the reference conditions, or by the first
+    interface where these are the mean motion.
+    """
+    kept = body.provenance.get(STEADY_STRESS)
+    if not kept or V.shape[1] == body.n:
+        return body.provenance
+    others = {key: of for key, of in body.provenance.items() if key != STEADY_STRESS}
+    if not V.shape[1] or body.surface is None or body.surface.stress is None:
+        return others
+    loads = _held_loads(body)
+    all_shapes = loads / body.omega2[:, None]
+    fewer = V @ ((V.T @ loads) / np.einsum("ia,i,ia->a", V, body.omega2, V)[:, None])
+    more, shown = (largest_von_mises(body.surface.stress @ q) for q in (all_shapes - fewer, fewer))
+    most = np.minimum(np.array(kept["left_out"]) + more, np.array(kept["largest"]) + shown)
+    left_out = [float(f"{x:.6g}") for x in most]
+    return {**others, STEADY_STRESS: {**kept, "left_out": left_out}}
+
+
+def _held_loads(body: FlexibleBody) -> Array:
+    """(n, 12) generalised forces of the unit accelerations."""
+    loads = loads_on_motions(body)[:INERTIAL]
+    if not body.interfaces or np.abs(body.P_dm).max(initial=0.0) > _MEAN * np.sqrt(body.mass):
+        return loads[:, 6:].T
+    first = interface_motions(body)[:6]
+    follows = -np.linalg.solve(first[:, :6], first[:, 6:])
+    return np.asarray((loads[:, 6:] + loads[:, :6] @ follows).T)
+
+
+def largest_von_mises(stress: Array) -> Array:
+    """(r,) the largest von Mises stress of stresses (P, 6, r)."""
+    xx, yy, zz, xy, xz, yz = np.moveaxis(stress, 1, 0)
+    normal = (xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2
+    return np.asarray(np.sqrt(0.5 * normal + 3.0 * (xy**2 + xz**2 + yz**2)).max(axis=0, initial=0.0))

@@ -156,7 +156,10 @@ def _read_elements(deck: _Deck, parameters: Mapping[str, str], rows: list[Row]) 
             deck.notes.append(f"{len(rows)} elements of type {parameters['TYPE']} are ignored; only solids are reduced")
         return
     numbers = np.array([int(word) for row in rows for word in row], np.int64).reshape(-1, size + 1).tolist()
-    target.update({number: nodes for number, *nodes in numbers})
+    for number, *nodes in numbers:
+        if any(of.get(number, nodes) != nodes for of in (*deck.solids.values(), deck.faces)):
+            raise InputError(f"element {number} is defined twice; write each part to a file of its own")
+        target[number] = nodes
     if "ELSET" in parameters:
         _extend(deck, deck.element_sets, parameters["ELSET"], [str(number) for number, *_ in numbers])
 

@@ -6,7 +6,7 @@ Blocks are pairs (kind, nodes (E, k)) as in `elements`; element numbers count th
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import pairwise
+from itertools import combinations, pairwise
 
 import numpy as np
 import scipy.sparse as sp
@@ -49,16 +49,54 @@ def groups_of_whole_faces(blocks: Blocks, groups: Sequence[Sequence[Array]]) -> 
 
 def joined_by_faces(blocks: Blocks) -> Array:
     """(E,) number of the part that each element belongs to, parts being joined by whole faces."""
-    _, _, face = _numbered(blocks, [])
+    return parts_and_overlaps(blocks)[0]
+
+
+def parts_and_overlaps(blocks: Blocks) -> tuple[Array, Array]:
+    """`joined_by_faces`, and the elements (m,) on that side of a face on which another element lies, too."""
+    faces, _, face = _numbered(blocks, [])
+    owner = _owners(blocks)
+    seen = 2 * face + np.concatenate([_turns(of[:, : face_corners(of.shape[1])]) for of in faces])
+    return _parts(owner, face), np.unique(owner[np.bincount(seen)[seen] > 1])
+
+
+def _turns(corners: Array) -> Array:
+    """(F,) whether the corner after the least one is less than that before it: which way round a face is seen."""
+    rows, least, size = np.arange(len(corners)), corners.argmin(axis=1), corners.shape[1]
+    return corners[rows, (least + 1) % size] < corners[rows, (least - 1) % size]
+
+
+def _owners(blocks: Blocks) -> Array:
+    """(F,) the element of every side."""
     per_element = np.concatenate([np.full(len(nodes), len(KINDS[kind].faces)) for kind, nodes in blocks])
-    return _parts(np.repeat(np.arange(per_element.size), per_element), face)
+    return np.repeat(np.arange(per_element.size), per_element)
+
+
+def misfits(blocks: Blocks) -> tuple[Array, Array]:
+    """Where elements of several kinds do not fit: edges (m, 2) with a node in the middle for some of their elements and none
+    for others; and quadrilaterals (q, 4) of some that are two triangles of others."""
+    edges, middle = (np.concatenate(of) for of in zip(*(_edges(kind, nodes) for kind, nodes in blocks), strict=True))
+    unique, which = np.unique(np.sort(edges, axis=1), axis=0, return_inverse=True)
+    has = [np.bincount(which.ravel(), weights=middle == there, minlength=len(unique)) > 0 for there in (True, False)]
+    outside = [faces[:, : face_corners(faces.shape[1])] for faces in outer_faces(blocks)]
+    triangles = {tuple(sorted(of)) for faces in outside if faces.shape[1] == 3 for of in faces.tolist()}
+    squares = [of for faces in outside if faces.shape[1] == 4 for of in faces.tolist()]
+    split = [of for of in squares if any(tuple(sorted(part)) in triangles for part in combinations(of, 3))]
+    return unique[has[0] & has[1]], np.array(split, np.int64).reshape(-1, 4)
+
+
+def _edges(kind: str, nodes: Array) -> tuple[Array, Array]:
+    """(m, 2) the edges of elements by their ends, and (m,) whether they have a node in the middle."""
+    corners = KINDS[kind].faces[:, : face_corners(KINDS[kind].faces.shape[1])]
+    ends = np.unique(np.sort(np.stack([corners, np.roll(corners, 1, axis=1)], axis=-1).reshape(-1, 2), axis=1), axis=0)
+    found = nodes[:, ends].reshape(-1, 2)
+    return found, np.full(len(found), KINDS[kind].size > KINDS[kind].corners)
 
 
 def neighbours(blocks: Blocks) -> Array:
     """(P, 2) pairs of elements that share a whole face."""
     _, _, face = _numbered(blocks, [])
-    per_element = np.concatenate([np.full(len(nodes), len(KINDS[kind].faces)) for kind, nodes in blocks])
-    owner = np.repeat(np.arange(per_element.size), per_element)
+    owner = _owners(blocks)
     order = np.argsort(face, kind="stable")
     same = face[order][1:] == face[order][:-1]
     return np.stack([owner[order][:-1][same], owner[order][1:][same]], axis=1)

@@ -48,12 +48,18 @@ class FileSolid:
 
 @dataclass(frozen=True)
 class FileSkin:
-    """The faces of a geometry's solids, meshed: points (N, 3), faces, the solids that the CAD library knows, the unit."""
+    """The faces of a geometry's solids, meshed: points (N, 3), faces, the solids that the CAD library knows, the unit.
+
+    overlaps : names of two solids that share a volume, and that volume, where it is asked for
+    notes    : what was left out, in words
+    """
 
     points: Array
     drawn: tuple[DrawnFace, ...]
     solids: tuple[FileSolid, ...]
     unit: str | None
+    overlaps: tuple[tuple[str, str, float], ...] = ()
+    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -77,7 +77,14 @@ def skin_from_gmsh(path: Path, **wanted: Any) -> FileSkin:
         (s["name"], s["label"], s["volume"], np.array(s["centre"]), np.reshape(s["inertia"], (3, 3)))
         for s in names["solids"]
     ]
-    return FileSkin(stored["points"], _drawn_faces(path, stored, names), tuple(FileSolid(*of) for of in solids), unit)
+    return FileSkin(
+        points=stored["points"],
+        drawn=_drawn_faces(path, stored, names),
+        solids=tuple(FileSolid(*of) for of in solids),
+        unit=unit,
+        overlaps=tuple((one, other, volume) for one, other, volume in names.get("overlaps", ())),
+        notes=(gmsh_process.NO_GROUP,) if names["left_out"] else (),
+    )
 
 
 @dataclass(frozen=True)
@@ -120,6 +127,7 @@ def _arrays(
     most_elements: float = MOST_ELEMENTS,
     glue: bool = False,
     solids: Sequence[str] = (),
+    overlaps: bool = False,
 ) -> tuple[dict[str, Array], str | None]:
     """The arrays that the process writes, and the unit of their numbers, where it is known."""
     suffix = path.suffix.lower()
@@ -139,6 +147,7 @@ def _arrays(
         "most": most_elements,
         "glue": glue,
         "solids": list(solids),
+        "overlaps": overlaps,
     }
     with _temporary() as folder:
         job_file, result = Path(folder, "job.json"), Path(folder, "result.npz")

@@ -4,7 +4,8 @@ Run as  python gmsh_process.py JOB.json RESULT.npz.  Gmsh is a large native libr
 ends only this process. It runs on one thread, so the same file gives the same mesh bit for bit.
 
 A job has: path, wanted ("lines", "surfaces", "solids", or "skin": the faces of solids with what they are), generate, unit,
-size, numbers, order, most (elements), glue, solids (names of those to keep; all where there are none).
+size, numbers, order, most (elements), glue, solids (names of those to keep; all where there are none), overlaps (whether
+the volumes that solids share are told).
 
 Exit codes: 0 done, 2 the file cannot be read, 3 gmsh cannot be loaded, 4 meshing failed, 5 the job asks for what cannot be
 meant, such as more elements than could be used. Messages are on stderr.
@@ -28,6 +29,7 @@ UNREADABLE, UNLOADABLE, UNMESHED, REFUSED = 2, 3, 4, 5
 
 _HXT, _DELAUNAY = 10, 1
 _FLAT = 1e-9
+_TOUCHING = 1e-6  # of a solid's volume: what solids that touch share by rounding
 _ELEMENTS_PER_TURN = 12
 _FEW_FACES = 100
 _LEAST = 1e-4  # of the extent: the finest elements along curves; at the tip of a cone their size would be none
@@ -36,6 +38,9 @@ _TETRAHEDRA_PER_CUBE = 8.5  # regular ones, of an edge like that of the cube
 _MOST_ALONG = 2e4
 _IGES = (".iges", ".igs")
 _CAD = (".step", ".stp", ".brep", *_IGES)
+
+
+NO_GROUP = "volumes in no physical group are left out, as gmsh does"
 
 
 class RefusedError(Exception):
@@ -60,6 +65,8 @@ def main() -> int:
         if job["generate"]:
             _generate(gmsh, job)
         arrays, names = _RESULTS[job["wanted"]](gmsh)
+        if job["overlaps"]:
+            names["overlaps"] = _overlaps(gmsh)
         if job["generate"]:
             arrays["points"] = _rounded(arrays["points"])
     except RefusedError as error:
@@ -294,7 +301,7 @@ def _add_volumes(gmsh: Any, index_of: np.ndarray, arrays: dict[str, np.ndarray],
     groups = _groups(gmsh, 3)
     entities = sorted({tag for members in groups.values() for tag in members})
     if len(entities) < len(gmsh.model.getEntities(3)):
-        names["notes"].append("volumes in no physical group are left out, as gmsh does")
+        names["notes"].append(NO_GROUP)
     numbers: dict[tuple[int, int], np.ndarray] = {}
     for k, kind in enumerate(int(kind) for kind in gmsh.model.mesh.getElementTypes(3)):
         blocks = [gmsh.model.mesh.getElementsByType(kind, tag)[1] for tag in entities]
@@ -330,7 +337,7 @@ def _skin(gmsh: Any) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
     arrays, index_of = _points(gmsh)
     names: dict[str, Any] = {}
     _add_geometry(gmsh, index_of, arrays, names)
-    known, given = {tag for _, tag in gmsh.model.occ.getEntities(3)}, _given_names(gmsh, 3)
+    known, given, meant = {tag for _, tag in gmsh.model.occ.getEntities(3)}, _given_names(gmsh, 3), _meant(gmsh)
     names["solids"] = [
         {
             "name": f"volume_{tag}",
@@ -340,21 +347,53 @@ def _skin(gmsh: Any) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
             "inertia": list(gmsh.model.occ.getMatrixOfInertia(3, tag)),
         }
         for _, tag in gmsh.model.getEntities(3)
-        if tag in known
+        if tag in known & meant
     ]
+    names["left_out"] = len(known - meant)
     return arrays, names
+
+
+def _meant(gmsh: Any) -> set[int]:
+    """The solids in physical groups, or all where there are none."""
+    return {tag for members in _groups(gmsh, 3).values() for tag in members}
+
+
+def _overlaps(gmsh: Any) -> list[tuple[str, str, float]]:
+    """Pairs of solids that share a volume, and that volume."""
+    names, known = _solid_names(gmsh), [tag for _, tag in gmsh.model.occ.getEntities(3)]
+    tags = [tag for tag in known if tag in _meant(gmsh)]
+    boxes = {tag: np.array(gmsh.model.occ.getBoundingBox(3, tag)).reshape(2, 3) for tag in tags}
+    found = []
+    for k, one in enumerate(tags):
+        for other in tags[k + 1 :]:
+            low, high = np.maximum(boxes[one][0], boxes[other][0]), np.minimum(boxes[one][1], boxes[other][1])
+            if (low < high).all() and (volume := _shared(gmsh, one, other)) > 0:
+                found.append((names[one], names[other], volume))
+    return found
+
+
+def _shared(gmsh: Any, one: int, other: int) -> float:
+    """The volume that two solids share; 0 of those that only touch."""
+    try:
+        both, _ = gmsh.model.occ.intersect([(3, one)], [(3, other)], removeObject=False, removeTool=False)
+    except Exception:  # gmsh raises nothing more specific, where nothing is shared
+        return 0.0
+    volume = sum(gmsh.model.occ.getMass(*piece) for piece in both if piece[0] == 3)
+    gmsh.model.occ.remove(both, recursive=True)
+    least = min(gmsh.model.occ.getMass(3, tag) for tag in (one, other))
+    return float(volume) if volume > _TOUCHING * least else 0.0
 
 
 def _add_geometry(gmsh: Any, index_of: np.ndarray, arrays: dict[str, np.ndarray], names: dict[str, Any]) -> None:
     """The faces of the solids that are drawn and not only meshed: their kind, numbers, names, colour and corners."""
-    names["geometry"], solid_names = [], _solid_names(gmsh)
+    names["geometry"], solid_names, meant = [], _solid_names(gmsh), _meant(gmsh)
     known = {tag for _, tag in gmsh.model.occ.getEntities(2)}
     drawn = [tag for _, tag in gmsh.model.getEntities(2) if gmsh.model.getType(2, tag) != "Discrete surface"]
     types = [
         (int(kind), gmsh.model.mesh.getElementProperties(int(kind))) for kind in gmsh.model.mesh.getElementTypes(2)
     ]
     for tag in drawn:
-        solids = [int(solid) for solid in gmsh.model.getAdjacencies(2, tag)[0]]
+        solids = [int(solid) for solid in gmsh.model.getAdjacencies(2, tag)[0] if solid in meant]
         if not solids:
             continue
         groups = [_physical_name(gmsh, 2, int(group)) for group in gmsh.model.getPhysicalGroupsForEntity(2, tag)]

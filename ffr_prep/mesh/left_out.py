@@ -38,6 +38,8 @@ _JOINED = ("connections of parts", "let the parts share nodes, or join them as p
 _SUPPORTS = ("supports", "they are joints of a scene; --reference says how the body is held for its modes")
 _LOADS = ("loads", "they belong to a scene")
 _DAMPING = ("damping", "give it by --rayleigh, --loss-factor or --damping")
+_TABLES = ("tables over temperature", "the constants are those of the card that they belong to")
+_NOT_LINEAR = ("yield and creep", "bodies are linearly elastic")
 _MATRICES = ("matrices", "take K and M of the whole model: ffr-prep reduce-matrices")
 
 # Keywords with their star, types of elements without.
@@ -70,6 +72,8 @@ _NASTRAN = (
     _Kind(r"SPC1?|SPCD", *_SUPPORTS),
     _Kind(r"FORCE[12]?|MOMENT[12]?|PLOAD[1245]?|GRAV|RFORCE|TEMPD?|SLOAD|ACCEL1?", *_LOADS),
     _Kind(r"GE", *_DAMPING),
+    _Kind(r"MATT\d+", *_TABLES),
+    _Kind(r"MATS1|MATEP|MATTEP|MATVP|CREEP|MATHE|MATVE", *_NOT_LINEAR),
     _Kind(r"GENEL|DMIG|DMIAX", *_MATRICES),
 )
 

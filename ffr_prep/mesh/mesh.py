@@ -21,7 +21,14 @@ from ffr_prep.common.in_words import extent_in_words
 from ffr_prep.common.progress import Stages, no_stages
 from ffr_prep.common.reading import check_ordinary, reading
 from ffr_prep.common.registry import choice, loaded
-from ffr_prep.mesh.boundary import groups_of_whole_faces, joined_by_faces, joined_by_nodes, outer_faces
+from ffr_prep.mesh.boundary import (
+    groups_of_whole_faces,
+    joined_by_faces,
+    joined_by_nodes,
+    misfits,
+    outer_faces,
+    parts_and_overlaps,
+)
 from ffr_prep.mesh.cells import FACE_TRIANGLES, KINDS, face_corners
 from ffr_prep.mesh.file_mesh import DrawnFace, FileMesh
 from ffr_prep.mesh.formats import MOST_ELEMENTS, format_of
@@ -314,8 +321,8 @@ def check_mesh(mesh: Mesh) -> None:
     """Raises InputError for a mesh that no computation should start from.
 
     Guarded: no elements, indices and coordinates that are not valid, nodes that no element uses, groups that are empty,
-    coincident nodes, elements that are repeated, degenerate or inverted, and parts that are not connected or hang
-    together by nodes or edges only.
+    coincident nodes, elements that are repeated, overlap at a face, are degenerate or inverted, and parts that are not
+    connected or hang together by nodes or edges only.
 
     >>> fp.check_mesh(fp.read_mesh("rod.msh"))
     """
@@ -432,12 +439,34 @@ def _check_connected(mesh: Mesh) -> None:
             f"the mesh has {by_nodes.max() + 1} unconnected parts: {_parts_in_words(mesh, by_nodes)}. A body is one "
             "piece: join the parts (shared nodes), or make each a body of its own"
         )
-    by_faces = joined_by_faces(_pairs(mesh))
+    by_faces, doubled = parts_and_overlaps(_pairs(mesh))
+    if doubled.size:
+        raise InputError(
+            f"{doubled.size} elements overlap, the first being element {doubled[0]} at {_at(_centres(mesh)[doubled[0]])}: "
+            "they lie on the same side of a face, so there is more mass than volume; remove one of what is meshed twice"
+        )
     if by_faces.max() > 0:
         raise InputError(
             f"the mesh has {by_faces.max() + 1} parts that touch at nodes or edges only, a hinge and not a joint of "
             f"solids: {_parts_in_words(mesh, by_faces)}. Let them share whole element faces"
         )
+
+
+def misfit_doubts(mesh: Mesh) -> list[str]:
+    """Notes on places where elements of several kinds do not fit, so that the mesh opens there under load."""
+    if len(mesh.blocks) < 2:
+        return []
+    edges, squares = misfits(_pairs(mesh))
+    said = (
+        (edges, "edges have a node in the middle for some of their elements and none for others"),
+        (squares, "faces are quadrilaterals of some elements and triangles of others"),
+    )
+    return [
+        f"{len(found)} {what}, the first at {_at(mesh.points[found[0]].mean(axis=0))}: the mesh opens there and is too soft; "
+        "let elements of one order and shape meet"
+        for found, what in said
+        if len(found)
+    ]
 
 
 def _parts_in_words(mesh: Mesh, part: Array) -> str:

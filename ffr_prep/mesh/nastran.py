@@ -34,6 +34,7 @@ class _Deck:
 
     grids: dict[int, Card] = field(default_factory=dict)
     systems: dict[int, Card] = field(default_factory=dict)
+    elements: set[int] = field(default_factory=set)  # numbers of the solids
     solids: dict[str, list[tuple[int, list[int]]]] = field(default_factory=lambda: defaultdict(list))
     faces: list[tuple[int, list[int]]] = field(default_factory=list)
     sets: dict[int, list[int]] = field(default_factory=dict)
@@ -68,7 +69,8 @@ def _take(deck: _Deck, card: Card) -> None:
     elif card.name in _FACES:
         deck.faces.append((card.integer(2, 0), [card.integer(3 + k) for k in range(_FACES[card.name])]))
     elif card.name in _SYSTEMS:
-        deck.systems[card.integer(1)] = card
+        if deck.systems.setdefault(card.integer(1), card).fields != card.fields:
+            raise InputError(f"{card} is defined twice")
     elif card.name == "GRDSET":
         deck.system = card.integer(2, 0)
     elif card.name == "SET1":
@@ -76,6 +78,9 @@ def _take(deck: _Deck, card: Card) -> None:
 
 
 def _take_solid(deck: _Deck, card: Card) -> None:
+    if card.integer(1) in deck.elements:
+        raise InputError(f"{card} is defined twice")
+    deck.elements.add(card.integer(1))
     corners, kinds = _SOLIDS[card.name]
     given = card.fields[2:]
     while given and not given[-1]:

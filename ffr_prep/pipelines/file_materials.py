@@ -12,13 +12,14 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from math import isnan, nan
 from pathlib import Path
 
 from ffr_prep.common.errors import InputError
 from ffr_prep.common.reading import reading
 from ffr_prep.matrices.unit_systems import UNIT_SYSTEMS, UnitSystem
 from ffr_prep.mesh.abaqus import keyword_sections
-from ffr_prep.mesh.bulk_data import cards
+from ffr_prep.mesh.bulk_data import Card, cards
 from ffr_prep.mesh.geometry.face import METRES
 from ffr_prep.mesh.mesh import Mesh
 from ffr_prep.model.material import Material, Solid, orthotropic
@@ -30,6 +31,7 @@ _STIFFEST, _SOFTEST = (
     1e6,
 )  # Pa; what is softer is more often N/mm^2 beside kg/m^3 than a foam, which --material gives
 _LIGHTEST, _HEAVIEST = 20.0, 3e4  # kg/m^3
+_SAME_SHEAR = 0.01  # of G: from here on Nastran, too, warns of a MAT1
 _SYSTEMS: Mapping[str, UnitSystem] = {**UNIT_SYSTEMS, "mm-g-ms": UnitSystem(1e-3, 1e-3, 1e-3)}
 
 
@@ -39,12 +41,18 @@ _BEYOND = ("CREEP", "DAMPING", "PLASTIC", "VISCOELASTIC")
 
 @dataclass
 class _Constants:
-    """Of a material in the units of its file: E, nu, or nine of an orthotropic one; rho."""
+    """Of a material in the units of its file: E, nu, or nine of an orthotropic one; rho; and words on what is not taken."""
 
     name: str
     elastic: tuple[float, ...] = ()
     rho: float | None = None
     kind: str = "ISOTROPIC"
+    words: str = ""
+
+    @property
+    def told(self) -> str:
+        """The name with the words."""
+        return self.name + self.words
 
 
 def file_materials(path: str | Path, mesh: Mesh, *, unit: str | None = None) -> Mapping[str, Solid]:
@@ -82,7 +90,7 @@ def names_of_materials(path: Path) -> list[str]:
     if path.suffix.lower() not in CARRIERS:
         return []
     with reading(path, "a mesh with materials"):
-        return sorted(one.name for one in _read(path)[0].values())
+        return sorted(one.told for one in _read(path)[0].values())
 
 
 def unit_system(path: Path, materials: list[_Constants], unit: str | None) -> str:
@@ -123,9 +131,9 @@ def _solid(path: Path, one: _Constants, system: UnitSystem) -> Solid:
     p, e = _pressure(system), one.elastic
     rho = (one.rho or 0.0) * system.mass / system.length**3
     if one.kind == "ISOTROPIC":
-        return Material(one.name, e[0] * p, e[1], rho)
+        return Material(one.told, e[0] * p, e[1], rho)
     moduli, shear = (e[0] * p, e[1] * p, e[2] * p), (e[6] * p, e[7] * p, e[8] * p)
-    return orthotropic(one.name, E=moduli, nu=(e[3], e[4], e[5]), G=shear, rho=rho)
+    return orthotropic(one.told, E=moduli, nu=(e[3], e[4], e[5]), G=shear, rho=rho)
 
 
 # ---- files --------------------------------------------------------------------------------------------------------
@@ -148,17 +156,31 @@ def _of_abaqus(path: Path) -> tuple[dict[str, _Constants], dict[str, str]]:
         if keyword == "MATERIAL":
             current = found.setdefault(parameters.get("NAME", "").upper(), _Constants(parameters.get("NAME", "")))
         elif keyword == "ELASTIC" and rows:
-            current.kind, current.elastic = _elastic(current, parameters, rows)
-            current.name += _temperature(current, rows)
+            kind, elastic = _elastic(current, parameters, rows)
+            _once(f"material {current.name!r}", "*ELASTIC", current.elastic, elastic)
+            current.kind, current.elastic = kind, elastic
+            current.words += _temperature(rows, *((1, 2) if kind == "ISOTROPIC" else (2, 1)))
         elif keyword in _BEYOND:
-            current.name += f", without its *{keyword}"
+            current.words += f", without its *{keyword}"
         elif keyword == "DENSITY" and rows:
-            current.rho = _numbers(rows[:1])[0]
+            rho = _numbers(rows[:1])[0]
+            _once(f"material {current.name!r}", "*DENSITY", current.rho, rho)
+            current.rho = rho
+            at = _temperature(rows, 1, 1)
+            current.words += f" with its density{at}" if at else ""
         elif keyword == "SOLID SECTION":
             if "ORIENTATION" in parameters:
                 raise InputError(f"{path}: a section has an ORIENTATION, which is not read; give --material with axes")
-            of_group[parameters.get("ELSET", "").upper()] = parameters.get("MATERIAL", "").upper()
+            group, name = (parameters.get(key, "").upper() for key in ("ELSET", "MATERIAL"))
+            _once(f"element set {group!r}", "material", of_group.get(group), name)
+            of_group[group] = name
     return found, of_group
+
+
+def _once(what: str, given: str, before: object, now: object) -> None:
+    """InputError for a second value beside another."""
+    if before and before != now:
+        raise InputError(f"{what} is given its {given} twice, and not the same: take one out, or give --material")
 
 
 def _elastic(
@@ -180,11 +202,13 @@ def _elastic(
     )
 
 
-def _temperature(material: _Constants, rows: list[list[str]]) -> str:
-    """Words for the temperature to which the constants belong, where the file has them for several."""
-    each, at = (1, 2) if material.kind == "ISOTROPIC" else (2, 1)
+def _temperature(rows: list[list[str]], each: int, at: int) -> str:
+    """Words for the temperature to which the first constants belong, where there are some for several.
+
+    each : rows of the constants at one temperature, which stands in column `at` of the last of them
+    """
     columns = [*rows[each - 1], *[""] * at]
-    return f" at {columns[at]}, the first of {len(rows) // each} temperatures" if len(rows) > each else ""
+    return f" at {columns[at] or 0}, the first of {len(rows) // each} temperatures" if len(rows) > each else ""
 
 
 def _numbers(rows: list[list[str]]) -> list[float]:
@@ -202,14 +226,30 @@ def _of_nastran(path: Path) -> tuple[dict[str, _Constants], dict[str, str]]:
     mass = 1.0  # of a unit of density: decks whose densities are weights say so
     for card in cards(path):
         if card.name == "MAT1":
-            E, G, nu = (card.real(k, 0.0) for k in (2, 3, 4))
-            nu = nu or (E / (2 * G) - 1 if G else 0.0)
-            E = E or 2 * G * (1 + nu)
-            found[str(card.integer(1))] = _Constants(f"MAT1 {card.integer(1)}", (E, nu), card.real(5, 0.0) or None)
+            number, one = str(card.integer(1)), _of_mat1(card)
+            _once(f"material {number}", "MAT1", found.get(number), one)
+            found[number] = one
         elif card.name == "PSOLID":
-            of_group[f"PROPERTY_{card.integer(1)}"] = str(card.integer(2))
+            group, number = f"PROPERTY_{card.integer(1)}", str(card.integer(2))
+            _once(f"property {card.integer(1)}", "PSOLID", of_group.get(group), number)
+            of_group[group] = number
         elif card.name in ("MAT9", "MAT2", "MAT8"):
             found[str(card.integer(1))] = _Constants(f"{card.name} {card.integer(1)}")
         elif card.name == "PARAM" and card.text(1).upper() == "WTMASS":
             mass = card.real(2)
     return {number: replace(of, rho=of.rho and mass * of.rho) for number, of in found.items()}, of_group
+
+
+def _of_mat1(card: Card) -> _Constants:
+    """E and nu, which solids take whatever G stands beside them; of a blank one from G."""
+    E, G, nu = (card.real(k, nan) for k in (2, 3, 4))
+    shear = 0.0 if isnan(G) else G
+    if isnan(nu):
+        nu = E / (2 * shear) - 1 if shear and not isnan(E) else 0.0
+    if isnan(E):
+        E = 2 * shear * (1 + nu) if card.text(4) else 0.0
+    off = bool(shear) and nu > -1 and abs(E / (2 * (1 + nu) * shear) - 1) > _SAME_SHEAR
+    words = (
+        f" by its E and nu, which make a shear modulus of {E / (2 * (1 + nu)):.6g} and not its G, {G:g}" if off else ""
+    )
+    return _Constants(f"MAT1 {card.integer(1)}", (E, nu), card.real(5, 0.0) or None, words=words)

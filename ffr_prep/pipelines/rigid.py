@@ -42,7 +42,7 @@ def rigid_part(
         pin = fp.rigid_part("pin.step", 7850.0, [fp.InterfaceRegion("hole", "cylinder r=6mm at 0,0,0")])
         fp.save_body(pin, "pin.ffr")
 
-    density    : [kg/m^3]
+    density    : [kg/m^3]; where solids overlap each of them counts, which is noted
     interfaces : points at which joints and forces attach: at the centroid of the faces of a region, or at its own point
     name       : of the body; that of the file without it
     other arguments as of `read_mesh`
@@ -58,7 +58,7 @@ def rigid_part(
         raise InputError(f"the density is {density} kg/m^3; it must be positive")
     Material("of the part", 1.0, 0.0, density)  # refuses what no solid has
     check_request(path, unit, None, numbers, 1)
-    faces, solid = _geometry(path, unit, numbers, solids)
+    faces, solid, twice = _geometry(path, unit, numbers, solids)
     points = {interface.name: _place(faces, interface) for interface in interfaces}
     if len(points) < len(interfaces):
         raise InputError("two interfaces have the same name: give each a name of its own")
@@ -72,30 +72,38 @@ def rigid_part(
     )
     regions = [{"name": i.name, "region": i.region or i.name} for i in interfaces if i.point is None]
     source = {"file": path.name, "unit": faces.unit, "density": density}
-    notes = [*faces.notes, *density_doubts(density), *units_doubts(body)]
+    notes = [*faces.notes, *twice, *density_doubts(density), *units_doubts(body)]
     made = {"kind": "rigid", "source": source, "interfaces": regions, "notes": notes}
     return replace(body, provenance=made)
 
 
 def _geometry(
     path: Path, unit: str | None, numbers: Mapping[str, float], solids: Sequence[str]
-) -> tuple[Faces, FileSolid]:
-    """The faces, and the volume, the centre and the inertia about it of all solids, in metres."""
+) -> tuple[Faces, FileSolid, list[str]]:
+    """The faces; the volume, the centre and the inertia about it of all solids, in metres; notes on what counts twice."""
     if format_of(path).geometry:
         settings = cad_settings(path, glue=False, solids=solids)
         with reading(path, "a geometry"):
-            skin = skin_from_gmsh(path, unit=unit, numbers=numbers, **settings)
+            skin = skin_from_gmsh(path, unit=unit, numbers=numbers, overlaps=True, **settings)
         scale = METRES[skin.unit or "m"]
         if skin.solids:
             known = [
                 FileSolid(s.name, s.label, s.volume * scale**3, s.centre * scale, s.inertia * scale**5)
                 for s in skin.solids
             ]
-            return skin_faces(skin), _together(known)
+            return skin_faces(skin), _together(known), _overlapping(skin.overlaps, skin.unit or "m")
     cad_settings(path, glue=False, solids=solids)
     mesh = read_mesh(path, unit=unit, numbers=numbers, order=2 if format_of(path).geometry else 1)
     check_mesh(mesh)
-    return mesh_faces(mesh), _integrated(mesh)
+    return mesh_faces(mesh), _integrated(mesh), []
+
+
+def _overlapping(overlaps: Sequence[tuple[str, str, float]], unit: str) -> list[str]:
+    return [
+        f"solids {one!r} and {other!r} overlap: {volume:.4g} {unit}^3 count twice in mass and inertia, as in a press fit; "
+        "where one of them should give way, cut it out of the other"
+        for one, other, volume in overlaps
+    ]
 
 
 def _together(solids: Sequence[FileSolid]) -> FileSolid:

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ffr_prep.body import STEADY_STRESS
+from ffr_prep.body import STEADY_STRESS, largest_von_mises
 from ffr_prep.common.arrays import Array
 from ffr_prep.model.coupled import CoupledModel
 from ffr_prep.model.model import Model
@@ -53,6 +53,4 @@ def _largest_stress(model: Model, fields: Array) -> Array | None:
     surface = model.stressed(fields)
     if surface is None or surface.stress is None or not len(surface.stress):
         return None
-    xx, yy, zz, xy, xz, yz = np.moveaxis(surface.stress, 1, 0)
-    normal = (xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2
-    return np.asarray(np.sqrt(0.5 * normal + 3.0 * (xy**2 + xz**2 + yz**2)).max(axis=0))
+    return largest_von_mises(surface.stress)

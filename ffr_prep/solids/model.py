@@ -13,7 +13,7 @@ from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 from ffr_prep.common.progress import Stages, no_stages
 from ffr_prep.mesh.geometry.skin import region_faces, with_regions
-from ffr_prep.mesh.mesh import Mesh, check_mesh, mesh_hash
+from ffr_prep.mesh.mesh import Mesh, check_mesh, mesh_hash, misfit_doubts
 from ffr_prep.model.coupled import CoupledModel, InterfaceRegion
 from ffr_prep.model.invariants import inertia_integrals
 from ffr_prep.model.material import material_doubts
@@ -114,12 +114,13 @@ def nodal_basis(model: CoupledModel, basis: Basis) -> Array:
 
 def mesh_warnings(mesh: Mesh) -> list[str]:
     """Doubts about the results of this mesh, in words."""
-    counts = element_counts(mesh)
+    counts, misfits = element_counts(mesh), misfit_doubts(mesh)
     if "tet4" not in counts:
-        return []
+        return misfits
     return [
+        *misfits,
         f"{counts['tet4']} first-order tetrahedra (tet4): they are far too stiff in bending (locking); "
-        "use second-order elements (tet10)"
+        "use second-order elements (tet10)",
     ]
 
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import pairwise
+from itertools import combinations, pairwise
 
 import numpy as np
 import scipy.sparse as sp
@@ -23,8 +23,11 @@ from ffr_prep.model.material import Material, check_isotropic
 from ffr_prep.structures.sections import Section
 
 Vector = tuple[float, float, float]
+Place = tuple[int, ...]  # nodes
+Seen = tuple[int, Array]  # an element, and the unit vector along which it leaves a place
 
 _SAME_PLACE = 1e-9
+_SAME_WAY = 1 - 1e-9  # the cosine between two ways that are one
 
 _MOST_ELEMENTS = 10_000_000
 _FAR = 1e100  # m; squares of coordinates must be finite
@@ -406,3 +409,70 @@ def _check_connected(frame: Frame) -> None:
             f"the frame has {parts} parts that nothing connects, with nodes at {places} m: a body is one piece; let "
             "members share nodes (joined(...) merges nodes at the same place), or make each part a body of its own"
         )
+
+
+# ---- what lies on one another -------------------------------------------------------------------------------------------
+
+
+def overlap_doubts(frame: Frame) -> list[str]:
+    """Notes on members that lie on one another without having the same nodes: beams that leave a node the same way,
+    plates on the same side of an edge."""
+    return [
+        f"{len(found)} pairs of {what} lie on one another, the first at {_at(found[0])}: each counts, with mass and "
+        "stiffness; remove one where it is meant once"
+        for what, found in (("beams", _doubled_beams(frame)), ("plates", _doubled_plates(frame)))
+        if found
+    ]
+
+
+def _doubled_beams(frame: Frame) -> list[Array]:
+    """A place (3,) for each pair, in the middle of the shorter one; those with different offsets lie side by side."""
+    ways = frame.points[frame.elements[:, 1]] - frame.points[frame.elements[:, 0]]
+    lengths = np.linalg.norm(ways, axis=1)
+    unit, offset = ways / lengths[:, None], [frame.members[k].section.offset for k in frame.member_of]
+    leaving = [
+        ((node,), (e, sign * unit[e]))
+        for sign, ends in ((1.0, frame.elements[:, 0]), (-1.0, frame.elements[:, 1]))
+        for e, node in enumerate(ends.tolist())
+    ]
+    pairs = {pair for pair, _ in _same_way(leaving) if offset[pair[0]] == offset[pair[1]]}
+    return [frame.points[frame.elements[min(pair, key=lambda e: lengths[e])]].mean(axis=0) for pair in sorted(pairs)]
+
+
+def _doubled_plates(frame: Frame) -> list[Array]:
+    """A place (3,) for each pair, in the middle of a common edge."""
+    places = {}
+    plates = [*frame.triangles.tolist(), *frame.quadrilaterals.tolist()]
+    leaving = [
+        (
+            (min(edge), max(edge)),
+            (e, _inward(frame.points[edge[0]], frame.points[edge[1]], frame.points[nodes].mean(axis=0))),
+        )
+        for e, nodes in enumerate(plates)
+        for edge in zip(nodes, (*nodes[1:], nodes[0]), strict=True)
+    ]
+    for pair, edge in _same_way(leaving):
+        places[pair] = frame.points[list(edge)].mean(axis=0)
+    return [places[pair] for pair in sorted(places)]
+
+
+def _same_way(leaving: Iterable[tuple[Place, Seen]]) -> Iterator[tuple[tuple[int, int], Place]]:
+    """Pairs of elements, and where they leave the same way."""
+    found: dict[Place, list[Seen]] = {}
+    for place, seen in leaving:
+        found.setdefault(place, []).append(seen)
+    for place, here in found.items():
+        for (e, one), (f, other) in combinations(here, 2):
+            if one @ other > _SAME_WAY:
+                yield (min(e, f), max(e, f)), place
+
+
+def _inward(a: Array, b: Array, centre: Array) -> Array:
+    """(3,) from the edge between a and b to the centre, across the edge, of length one."""
+    along = (b - a) / np.linalg.norm(b - a)
+    across = (centre - a) - ((centre - a) @ along) * along
+    return np.asarray(across / np.linalg.norm(across))
+
+
+def _at(point: Array) -> str:
+    return "(" + ", ".join(f"{x:.4g}" for x in point) + ") m"

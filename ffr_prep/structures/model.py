@@ -32,7 +32,7 @@ from ffr_prep.model.second_order import SecondOrder
 from ffr_prep.solvers.threads import on_one_thread
 from ffr_prep.structures.cutting import cut_frame
 from ffr_prep.structures.element_families import Family, connectivity, element_values, families
-from ffr_prep.structures.frame import Frame, check_frame, frame_hash
+from ffr_prep.structures.frame import Frame, check_frame, frame_hash, overlap_doubts
 from ffr_prep.structures.interfaces import couple_frame, tie, turning_regions
 from ffr_prep.structures.second_order import frame_second_order
 
@@ -182,7 +182,10 @@ def _record(
         "members": [_strict(described(member)) for member in frame.members],
         "shells": [described(shell) for shell in frame.shells],
         "interfaces": [described(interface) for interface in interfaces],
-        "warnings": list(dict.fromkeys(doubt for material in materials for doubt in material_doubts(material))),
+        "warnings": [
+            *overlap_doubts(frame),
+            *dict.fromkeys(doubt for material in materials for doubt in material_doubts(material)),
+        ],
     }
 
 

@@ -77,8 +77,8 @@ def skin_faces(skin: FileSkin) -> Faces:
         points, [facet_triangles(face.corners) for face in skin.drawn], [face.solids for face in skin.drawn]
     )
     made = [face_of(face, scale, points, own) for face, own in zip(skin.drawn, triangles, strict=True)]
-    notes = doubtful_unit(float(np.ptp(points, axis=0).max()), skin.unit)
-    return Faces(tuple(made), points, tuple(triangles), unit=skin.unit or "m", notes=tuple(notes))
+    notes = (*skin.notes, *doubtful_unit(float(np.ptp(points, axis=0).max()), skin.unit))
+    return Faces(tuple(made), points, tuple(triangles), unit=skin.unit or "m", notes=notes)
 
 
 def _outward(points: Array, triangles: Sequence[Array], solids: Sequence[Sequence[str]]) -> list[Array]:

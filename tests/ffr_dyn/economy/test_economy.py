@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+import tomllib
+from contextlib import nullcontext
 from dataclasses import replace
 from functools import partial
 
@@ -14,6 +16,8 @@ from ffr_gallery.scene_set import (
     GRAVITY,
     bar,
     beam,
+    block,
+    cantilever,
     case,
     chain,
     distance,
@@ -25,7 +29,9 @@ from ffr_gallery.scene_set import (
     spin_up,
 )
 
+from ffr_dyn.analyses.forward import forward
 from ffr_dyn.analyses.integration import integrate
+from ffr_dyn.analyses.run import run
 from ffr_dyn.analyses.settings import Settings
 from ffr_dyn.cli import cli
 from ffr_dyn.consistency.assemble import assemble
@@ -36,7 +42,7 @@ from ffr_dyn.economy.contributions import of_motion, of_omitted, of_shapes, own
 from ffr_dyn.economy.cost import of_run, per_evaluation
 from ffr_dyn.economy.inertia_terms import TermEffect, _inertial, without_minor
 from ffr_dyn.economy.model_choice import Part, applied, full, kind, orthonormal, rigid
-from ffr_dyn.economy.outputs import Output, as_output, difference, largest, largest_stress, probe
+from ffr_dyn.economy.outputs import Output, as_output, check_meaning, difference, largest, largest_stress, probe
 from ffr_dyn.economy.picture import diagram
 from ffr_dyn.economy.policy import Policy
 from ffr_dyn.economy.report import as_html, as_markdown, as_text, write_report
@@ -46,18 +52,21 @@ from ffr_dyn.economy.run import Span, make, states
 from ffr_dyn.economy.search import economise
 from ffr_dyn.economy.steps import _from_two_rows, _of_both, chosen_step, error_of
 from ffr_dyn.economy.verification import _better, _known
-from ffr_dyn.functions.formula import formula
+from ffr_dyn.functions.formula import formula, parse
 from ffr_dyn.functions.time_functions import TimeFunction
 from ffr_dyn.functions.together import alone
 from ffr_dyn.integrators import ROS2, ROS3
 from ffr_dyn.integrators.stabilisation import Projection
 from ffr_dyn.results.result import Result
 from ffr_dyn.scene.drivers import Driver
+from ffr_dyn.scene.forces import JointFriction, JointSpring, JointStop, Load
 from ffr_dyn.scene.joints import Joint
 from ffr_dyn.scene.scene import Body, Scene
+from ffr_dyn.scene.sensors import Measurement, StressMeasurement
 from ffr_dyn.scene_file.read import load_scene
+from ffr_dyn.scene_file.state_formula import StateFormula
 from ffr_dyn.scene_file.write import save_scene
-from ffr_dyn.variants.mean_axis import with_mean_axis_bodies
+from ffr_dyn.variants.mean_axis import in_new_frames, with_mean_axis_bodies
 from ffr_dyn.variants.variant import STIFFENING, stiffening_by
 from ffr_prep.common.errors import ComputationError, InputError
 from ffr_prep.model.reference import FixedTo, MeanAxis, SimplySupported
@@ -157,6 +166,25 @@ def test_the_error_of_a_step_comes_with_its_sign():
     true = difference(fine.values, finest.values)
     for estimated, wanted in zip(error_of(fine, coarse), true, strict=True):
         assert np.abs(estimated - wanted).max() < 0.3 * np.abs(wanted).max()
+
+
+def test_no_order_is_taken_for_granted_where_steps_jump_over_an_impact():
+    """An arm with a weight that falls on a stop: by third order a coarse step would be told a seventh of its error."""
+    arm = Body("arm", bar("arm", 0.4, rectangle(0.02, 0.006), ALUMINIUM), damping=0.02)
+    weight = Body("weight", block("weight", 0.05, 0.02), position=(0.4, 0, 0))
+    joints = Joint("hinge", "revolute", "ground.O", "arm.a"), Joint("grip", "fixed", "arm.b", "weight.pin")
+    forces = (
+        JointFriction("rub", "hinge", coulomb=0.02, creep=0.05),
+        JointStop("stop", "hinge", lower=-0.6, upper=2.0, stiffness=400.0, damping=1.5, entry=0.01),
+        JointSpring("spring", "hinge", stiffness=0.3),
+    )
+    scene = Scene((arm, weight), joints, forces=forces, ground={"O": (0, 0, 0)}, gravity=GRAVITY)
+    outputs = ("stop.torque", "arm.b.position")
+    found = economise(scene, outputs, end=0.5, output_step=0.005, tolerance=5e-2, verify=False)
+    true = forward(scene, end=0.5, output_step=0.005, method=ROS3(1e-4), check=False)
+    small = run(found.scene, found.settings)
+    off = [np.abs(small[name] - true[name]).max() for name in outputs]
+    assert (off <= found.limits).all()
 
 
 def test_the_least_run_takes_shorter_steps_until_it_comes_to_an_end():
@@ -300,6 +328,64 @@ def test_outputs_that_say_nothing_are_refused(outputs, said):
         economise(SLOW.scene(), outputs, end=0.14, output_step=0.014)
 
 
+def swung(*loads: Load, stiffening: bool = True) -> Scene:
+    """A rod whose frame is at its hinge, with a weight at its end."""
+    rod = Body("rod", cantilever("rod", 0.5, rectangle(0.02, 0.004), ALUMINIUM), damping=0.01, stiffening=stiffening)
+    weight = Body("weight", block("weight", 0.1, 0.02), position=(0.5, 0, 0))
+    hinge, clamp = Joint("hinge", "revolute", "ground.O", "rod.a"), Joint("clamp", "fixed", "rod.b", "weight.pin")
+    tip = Measurement("tip", "ground.O", "rod.b", axes="rod")
+    return Scene(
+        (rod, weight), (hinge, clamp), loads=loads, ground={"O": (0, 0, 0)}, measurements=(tip,), gravity=GRAVITY
+    )
+
+
+def checked(scene: Scene, *outputs: str) -> None:
+    made, moved = in_new_frames(scene)
+    check_meaning(probe(assemble(made), [as_output(name, 1e-2) for name in outputs]), made, moved)
+
+
+@pytest.mark.parametrize("output", ["displacement.y", "omega_bar.z", "R", "force_i.x", "tip.x"])
+def test_outputs_seen_from_a_frame_that_the_model_does_not_have_are_refused(output):
+    """A body with load matrices has that of its mean motion there, a linear one its own."""
+    before = {"displacement.y": "rod.b", "force_i.x": "clamp", "tip.x": "measured"}.get(output, "rod")
+    with pytest.raises(InputError, match="is seen from the frame of body 'rod'"):
+        checked(swung(), f"{before}.{output}")
+    checked(swung(stiffening=False), f"{before}.{output}")
+    checked(swung(), "rod.b.position", "rod.stress", "clamp.force", "weight.R")
+
+
+@pytest.mark.parametrize("stiffening", [True, False])
+@pytest.mark.parametrize("output", ["rod.q", "rod.q_dot"])
+def test_elastic_coordinates_are_no_outputs(output, stiffening):
+    with pytest.raises(InputError, match="elastic coordinates are those of a model"):
+        checked(swung(stiffening=stiffening), output)
+
+
+@pytest.mark.parametrize(
+    ("name", "stiffening", "refused"),
+    [
+        ("rod.q.1", False, True),
+        ("rod.omega_bar.z", True, True),
+        ("rod.omega_bar.z", False, False),
+        ("weight.omega_bar.z", True, False),
+        ("rod.b.velocity.y", True, False),
+    ],
+)
+def test_forces_that_read_what_a_smaller_model_does_not_have_are_refused(name, stiffening, refused):
+    read = parse("0 * " + name.replace(".q.1", ".q[1]"), {}, "")
+    push = Load("push", "rod.b", function=StateFormula((read, read, read)))
+    with pytest.raises(InputError, match=f"'push' depends on '{name}'") if refused else nullcontext():
+        checked(swung(push, stiffening=stiffening), "rod.b.position")
+
+
+def test_the_frames_that_are_new_are_told_and_rigid_bodies_lose_no_power():
+    found = economise(swung(), ["rod.b.position.x", "rod.damping.power=1e3"], end=0.1, output_step=0.01, verify=False)
+    assert any("the frame of 'rod' is that of its mean motion" in note for note in found.notes) is bool(
+        found.choice.count
+    )
+    assert np.isfinite(found.error).all()
+
+
 # ---- the search -----------------------------------------------------------------------------------------------------
 
 
@@ -412,7 +498,7 @@ def test_a_fast_slender_rod_keeps_bending_and_drops_stretching(fast):
 
 def test_stiffening_is_kept_above_the_critical_spin():
     """The beam's first frequency is 3.8 rad/s; a third of the published run suffices to need it."""
-    found = economise(spin_up(6.0), ("blade.b.displacement.y",), end=12.0, output_step=0.1, tolerance=1e-2)
+    found = economise(spin_up(6.0), ("measured.tip.y",), end=12.0, output_step=0.1, tolerance=1e-2)
     blade = found.choice.parts[1]
     assert blade.count > 0
     assert blade.stiffened
@@ -512,6 +598,22 @@ def test_what_is_said_of_a_model_is_true(name, verify):
         assert found.verification.is_known
         assert (true <= 1.05 * found.verification.error).all()
         assert "Verified" in as_text(found)
+
+
+def test_stress_that_the_shapes_of_the_full_model_lack_is_told():
+    """Of its own inertia: no reference tells that, since the full model lacks it too."""
+    lacking = slider_crank(100.0)
+    rod = next(body for body in lacking.bodies if body.name == "rod")
+    for lacks, told in ((0.0, False), (5e3, True)):  # Pa s^2, under spin about z'
+        kept = {"left_out": [0.0] * 8 + [lacks] + [0.0] * 3, "largest": [1e4] * 12}
+        made = replace(rod, model=replace(rod.model, provenance={**rod.model.provenance, "steady_stress": kept}))
+        bodies = tuple(made if one.name == "rod" else one for one in lacking.bodies)
+        scene = replace(lacking, bodies=bodies, measurements=(StressMeasurement("notch", "rod", (0.1, 0, 0)),))
+        found = economise(scene, ["rod.stress=1e4"], end=0.02, output_step=0.001, verify=False)
+        assert any("leave out up to" in note for note in found.notes) is told
+        assert ("leave out up to" in as_text(found)) is told
+        assert found.choice.parts[1].count < rod.model.n  # what the chosen model lacks beside the full one is no note
+        assert any("leave out stress of its own inertia" in note for note in found.notes) is told
 
 
 # ---- report, advice, chart, command ---------------------------------------------------------------------------------
@@ -628,6 +730,29 @@ def test_the_command_keeps_parameters_and_events(tmp_path):
         assert how.analysis.events[0].stop
     assert '"0 * g"' in (tmp_path / "out.toml").read_text()
     assert how.end == 0.1
+
+
+def test_parameters_that_no_longer_act_as_they_did_are_left_out(tmp_path):
+    """The damping of a body is that of the modes of its model now; what stands with its parameter goes with it."""
+    scene = slider_crank(50.0)
+    settings = Settings(start=0.0, end=0.1, output_step=0.005, method=ROS2(0.0005), stabilisation=Projection())
+    save_scene(scene, settings, tmp_path / "in.toml")
+    tree = tomllib.loads((tmp_path / "in.toml").read_text())
+    text = (tmp_path / "in.toml").read_text()
+    damping = f"damping = {tree['bodies']['rod']['damping']}"
+    assert text.count(damping) == 2
+    text = text.replace(damping, 'damping = "2 * half"').replace("gravity = [0.0, 0.0, 0.0]", 'gravity = [0, "-g", 0]')
+    text = text.replace("O = [0.0, 0.0, 0.0]", 'O = ["0 * half", "0 * side", 0]')
+    text = text.replace("[ground]", '[parameters]\ng = 9.81\nunit = 1.0\nhalf = "0.005 * unit"\nside = 1.0\n\n[ground]')
+    (tmp_path / "in.toml").write_text(text)
+    arguments = ["economise", str(tmp_path / "in.toml"), "--output", "rod.stress=1%", "-o", str(tmp_path / "out.toml")]
+    done = CliRunner().invoke(cli, arguments)
+    assert done.exit_code == 0, done.output
+    assert "note     unit, half, side: not among the parameters" in done.output
+    made = load_scene(tmp_path / "out.toml", {"g": "3"})[0]
+    assert made.gravity.tolist() == [0.0, -3.0, 0.0]
+    with pytest.raises(InputError, match="there is no parameter 'half'"):
+        load_scene(tmp_path / "out.toml", {"half": "0.1"})
 
 
 def test_the_command_answers_a_wrong_output(tmp_path):

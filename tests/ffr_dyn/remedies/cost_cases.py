@@ -10,6 +10,7 @@ from tempfile import TemporaryDirectory
 from unittest.mock import patch
 
 from ffr_gallery.bodies import beam
+from ffr_gallery.scene_set import pendulum
 from remedy import CLOUD, DOUBLE, HINGED, run, stressed
 from said import Case
 from synthetic import cloud
@@ -25,9 +26,11 @@ from ffr_dyn.economy.policy import Policy
 from ffr_dyn.economy.report import write_report
 from ffr_dyn.economy.result import Economy
 from ffr_dyn.economy.search import economise
+from ffr_dyn.functions.formula import parse
 from ffr_dyn.integrators.stabilisation import Projection
-from ffr_dyn.scene.forces import SpringDamper
+from ffr_dyn.scene.forces import Load, SpringDamper
 from ffr_dyn.scene.scene import Body, Scene
+from ffr_dyn.scene_file.state_formula import StateFormula
 from ffr_dyn.variants.variant import basis_of, stiffening_by, vary, with_model, with_modes
 from ffr_prep.common.errors import ComputationError
 
@@ -132,6 +135,13 @@ def reported(name: str) -> None:
         write_report(economised(TIP), Path(folder) / name)
 
 
+def read(name: str) -> Scene:
+    """The pendulum with a force that depends on something."""
+    formula = parse(f"0 * {name}", {}, "")
+    return replace(SWUNG, loads=(Load("push", "rod.b", function=StateFormula((formula, formula, formula))),))
+
+
+SWUNG = pendulum(7e10)
 HELD = "cloud.a.position.y"
 SOON = (Event("end", lambda t, state: t - 0.03, stop=True),)
 LOUD = replace(SWING, bodies=(Body("cloud", stressed(cloud(2), 1e300)),))
@@ -144,6 +154,12 @@ ECONOMY = [
     asked(("clod.stress",), ("cloud.stress=5%",)),
     Case(p(economised, "cloud.stress", scene=CLOUD), p(economised, "cloud.stress=5%")),
     asked((HELD,), (f"{HELD}=1e-3",)),
+    asked(("cloud.q",), (TIP,)),
+    Case(p(economised, "rod.b.displacement.y", scene=SWUNG), p(economised, "rod.b.position.y", scene=SWUNG)),
+    Case(
+        p(economised, "rod.b.position.y", scene=read("rod.q[1]")),
+        p(economised, "rod.b.position.y", scene=read("rod.b.velocity.y")),
+    ),
     Case(p(reported, "report.pdf"), p(reported, "report.txt")),
     Case(lambda: applied(HINGED, full(DOUBLE, "ros2", 1)), lambda: applied(HINGED, full(HINGED, "ros2", 1))),
     Case(p(economised, TIP, scene=held(1e20)), p(economised, TIP, scene=held(10.0))),

@@ -19,7 +19,7 @@ from test_animate import rotating_box
 import ffr_prep as fp
 from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.cli import cli
-from ffr_dyn.functions.time_functions import polynomial
+from ffr_dyn.functions.time_functions import harmonic, polynomial
 from ffr_dyn.integrators import ROS2
 from ffr_dyn.pictures.animate import animate
 from ffr_dyn.pictures.film import film
@@ -37,6 +37,7 @@ from ffr_dyn.results.stress import (
     values_at,
 )
 from ffr_dyn.results.stress_error import stress_error
+from ffr_dyn.scene.described import described
 from ffr_dyn.scene.drivers import Driver
 from ffr_dyn.scene.joints import Joint
 from ffr_dyn.scene.scene import Body, Scene
@@ -48,10 +49,12 @@ from ffr_dyn.scene.stress_sensors import (
     strain_of,
     von_mises,
 )
-from ffr_prep.body import SECTION_FORCES, BeamForces, Surface, steady_stress_doubt
+from ffr_dyn.variants.variant import with_basis
+from ffr_prep.body import SECTION_FORCES, BeamForces, Surface, left_out_stress, steady_stress_doubt, truncated
 from ffr_prep.common.errors import InputError
 from ffr_prep.mesh.mesh import Block
 from ffr_prep.model.coupled import InterfaceRegion
+from ffr_prep.model.material import Material
 from ffr_prep.model.reference import FixedTo, MeanAxis
 from ffr_prep.reduction.methods.craig_bampton import CraigBampton
 from ffr_prep.reduction.methods.eigenmodes import Eigenmodes
@@ -303,6 +306,49 @@ def test_a_rotating_bar_has_the_tension_of_the_mass_beyond(relief, smallest, lar
     assert bool(steady_stress_doubt(bar.provenance)) is not relief
     written = [line for line in report_lines(stress_report(result, tmp_path)) if line.startswith("accuracy")]
     assert ("--method inertia-relief" in written[0]) is not relief
+
+
+def relieved_bar():
+    """A clamped bar along x, with bending shapes and those of its own inertia."""
+    model = fp.from_mesh(
+        box_mesh("hex20", (1.0, 0.02, 0.02), (10, 1, 1), origin=(0, -0.01, -0.01)),
+        Material("metal", 7e10, 0.0, 2700.0),
+        [InterfaceRegion("left")],
+    )
+    return fp.reduce(
+        model,
+        fp.Request(
+            name="bar",
+            reference=FixedTo("left"),
+            reduction=Union((CraigBampton(2), InertiaRelief())),
+            stress=True,
+            linear=True,
+        ),
+    )
+
+
+@pytest.mark.parametrize("few", [lambda bar: truncated(bar, 2), lambda bar: with_basis(bar, np.eye(bar.n)[:, :2])])
+def test_what_fewer_shapes_leave_out_is_told_by_the_body_that_has_them(few):
+    """Bending shows nothing of rho Omega^2 L^2 / 2 of a bar that turns across its axis; all shapes do."""
+    whole = relieved_bar()
+    bar = few(whole)
+    tension = 2700.0 / 2
+    for spin in (7, 8):  # products yy and zz
+        assert left_out_stress(whole.provenance)[spin] < 0.02 * tension
+        assert left_out_stress(bar.provenance)[spin] == pytest.approx(tension, rel=0.03)
+    assert steady_stress_doubt(whole.provenance) is None
+    assert "leave out stress of its own inertia" in steady_stress_doubt(bar.provenance)
+    assert not left_out_stress(truncated(whole, 0).provenance)
+
+
+def test_on_an_accelerated_base_what_is_missing_is_not_known():
+    """A result does not keep the acceleration of its base, which loads the shapes as gravity does."""
+    bar, hinge = relieved_bar(), (Joint("hinge", "revolute", "ground.O", "body.left"),)
+    known = []
+    for base in ((0, 0, 0), (0, harmonic(amplitude=5.0, frequency=2.0), 0)):
+        scene = Scene((Body("body", bar),), hinge, ground={"O": (0, 0, 0)}, base_acceleration=base)
+        known.append("left_out_stress" in described(scene))
+    assert known == [True, False]
 
 
 def ring(elements, radius, thickness):

@@ -128,6 +128,8 @@ def test_faces_sets_and_what_is_ignored(tmp_path):
         ("FORCE,1,1,0,1.,1.,0.,0.", "1 FORCE left out: loads"),
         ("BGSET,1,1,2,3", "1 BGSET left out: connections of parts"),
         ("MAT1,5,2.1+11,,.3,7850.,,,0.02", "1 GE left out: damping"),
+        ("MATT1,5,21", "1 MATT1 left out: tables over temperature"),
+        ("MATS1,5,,PLASTIC", "1 MATS1 left out: yield and creep"),
         ("DMIG,K2GG,0,6,1,0", "1 DMIG left out: matrices"),
     ],
 )
@@ -159,6 +161,8 @@ def test_points_in_cylindrical_and_turned_systems(tmp_path):
         ("CTETRA,9,1,1,2,3,4711", "GRID 4711, which the file does not define"),
         ("CPENTA,9,1,1,2,3,4,5,6", "volume elements of kind 'CPENTA'"),
         ("GRID,1,,0.,0.,0.", "GRID 1 is defined twice"),
+        ("CTETRA,1,7,1,2,3,4", "CTETRA 1 is defined twice"),
+        ("CORD2R,5,,0.,0.,0.,0.,0.,1.\n,1.,0.,0.\nCORD2R,5,,0.,0.,1.,0.,0.,2.\n,1.,0.,0.", "CORD2R 5 is defined twice"),
         ("GRID,4711,,0.,x,0.", "field 5 is 'x', where a number belongs"),
     ],
 )
@@ -272,6 +276,7 @@ def test_binary_and_damaged_results_are_refused(tmp_path):
 
 # ---- materials ----------------------------------------------------------------------------------------------------
 
+FIRST = "the first of 2 temperatures"
 STEEL = {"m": (2.1e11, 7850.0), "mm": (2.1e5, 7.85e-9)}
 
 
@@ -343,6 +348,11 @@ def test_orthotropic_materials_and_those_that_are_not_read(tmp_path):
     ("elastic", "more", "name"),
     [
         ("\n2.1e11, .3, 20.\n1.9e11, .3, 300.", "", "Stahl at 20., the first of 2 temperatures"),
+        (
+            "\n2.1e11, .3, 20.\n1.9e11, .3, 300.",
+            "7700., 300.",
+            "Stahl at 20., the first of 2 temperatures with its density at 0, the first of 2 temperatures",
+        ),
         ("\n2.1e11, .3", "*PLASTIC\n2e8, 0.\n*DAMPING, ALPHA=1.", "Stahl, without its *PLASTIC, without its *DAMPING"),
         (
             ", TYPE=ENGINEERING CONSTANTS\n1e10, 8e8, 5e8, .4, .3, .3, 7e8, 7e8\n8e7, 20."
@@ -378,3 +388,54 @@ def test_nastran_materials(tmp_path):
     (tmp_path / "a.bdf").write_text(text)
     (material,) = fp.file_materials(tmp_path / "a.bdf", fp.read_mesh(tmp_path / "a.bdf")).values()
     np.testing.assert_allclose((material.E, material.nu, material.rho), (2.1e11, 0.3, 7850.0), rtol=1e-7)
+    assert material.name == "MAT1 3"
+
+
+@pytest.mark.parametrize(
+    ("card", "constants", "name"),
+    [
+        ("MAT1,3,2.1+11,5.+10,.3,7850.", (2.1e11, 0.3), "by its E and nu, which make a shear modulus of 8.07692e+10 and not"),
+        ("MAT1,3,2.1+11,8.+10,.3,7850.", (2.1e11, 0.3), ""),  # rounded
+        ("MAT1,3,2.1+11,8.+10,0.,7850.", (2.1e11, 0.0), "which make a shear modulus of 1.05e+11"),
+        ("MAT1,3,2.1+11,,,7850.", (2.1e11, 0.0), ""),
+        ("MAT1,3,,8.+10,.3,7850.", (2.08e11, 0.3), ""),
+        ("MAT1,3,,8.+10,0.,7850.", (1.6e11, 0.0), ""),
+    ],
+)  # fmt: skip
+def test_a_shear_modulus_that_does_not_fit_is_told(tmp_path, card, constants, name):
+    """Solids of Nastran take E and nu; a nu of zero is given, a blank one is not."""
+    text = deck(box("tet4"), "tet4", free).replace("ENDDATA", f"PSOLID,7,3\n{card}\nENDDATA", 1)
+    (tmp_path / "a.bdf").write_text(text)
+    (material,) = fp.file_materials(tmp_path / "a.bdf", fp.read_mesh(tmp_path / "a.bdf")).values()
+    np.testing.assert_allclose((material.E, material.nu), constants)
+    assert material.name == "MAT1 3" if not name else name in material.name
+
+
+@pytest.mark.parametrize(
+    ("more", "said"),
+    [
+        ("MAT1,3,2.0+11,,.3,7850.", "material 3 is given its MAT1 twice"),
+        ("PSOLID,7,4", "property 7 is given its PSOLID twice"),
+    ],
+)
+def test_a_deck_that_contradicts_itself_is_refused(tmp_path, more, said):
+    text = deck(box("tet4"), "tet4", free).replace(
+        "ENDDATA", f"PSOLID,7,3\nMAT1,3,2.1+11,,.3,7850.\n{more}\nENDDATA", 1
+    )
+    (tmp_path / "a.bdf").write_text(text)
+    with pytest.raises(InputError, match=said):
+        fp.file_materials(tmp_path / "a.bdf", fp.read_mesh(tmp_path / "a.bdf"))
+
+
+@pytest.mark.parametrize(
+    ("more", "said"),
+    [
+        ("*DENSITY\n7800.", "material 'Stahl' is given its \\*DENSITY twice"),
+        ("*MATERIAL, NAME=STAHL\n*ELASTIC\n2e11, .3", "material 'Stahl' is given its \\*ELASTIC twice"),
+        ("*SOLID SECTION, ELSET=EALL, MATERIAL=HOLZ", "element set 'EALL' is given its material twice"),
+    ],
+)
+def test_an_input_file_that_contradicts_itself_is_refused(tmp_path, more, said):
+    (tmp_path / "a.inp").write_text(inp("m", None, more))
+    with pytest.raises(InputError, match=said):
+        fp.file_materials(tmp_path / "a.inp", fp.read_mesh(tmp_path / "a.inp"))

@@ -21,6 +21,7 @@ from ffr_prep.mesh.mesh import (
     check_mesh,
     face_group,
     mesh_hash,
+    misfit_doubts,
     read_mesh,
     region_nodes,
     surface_triangles,
@@ -28,6 +29,7 @@ from ffr_prep.mesh.mesh import (
 from ffr_prep.mesh.shapes import jacobian_determinants
 from ffr_prep.mesh.time_limit import mesher_time_limit
 from ffr_prep.solids.assembly import assemble
+from ffr_prep.solids.model import mesh_warnings
 
 SIZE = np.array([2.0, 0.3, 0.2])
 CELLS = (3, 2, 2)
@@ -265,6 +267,51 @@ def test_parts_that_share_an_edge_only():
     beside = moved(mesh, np.eye(3), np.array([1.0, 1.0, 0]))
     with pytest.raises(InputError, match="2 parts that touch at nodes or edges only"):
         check_mesh(merged(joined(mesh, beside)))
+
+
+@pytest.mark.parametrize("kind", ["hex8", "tet4", "tet10"])
+def test_elements_on_the_same_side_of_a_face_overlap(kind):
+    """What is meshed twice, with another node inside: mass beyond the volume, though the parts hang together by a face."""
+    mesh = box_mesh(kind, (1, 1, 1), (2, 1, 1))
+    first = mesh.blocks[0].nodes[0]
+    own = TABLE[kind].faces[0]  # what the second one shares with it; its other nodes are its own
+    others = np.setdiff1d(np.arange(first.size), own)
+    centre = mesh.points[first[own]].mean(axis=0)
+    points = np.vstack([mesh.points, centre + 0.7 * (mesh.points[first[others]] - centre)])
+    again = first.copy()
+    again[others] = len(mesh.points) + np.arange(others.size)
+    nodes = np.vstack([mesh.blocks[0].nodes, again])
+    for here in (nodes, nodes[::-1]):
+        with pytest.raises(InputError, match="2 elements overlap"):
+            check_mesh(replace(mesh, points=points, blocks=(Block(kind, here),), volume_groups={}, face_groups={}))
+
+
+def of_first_order(mesh, beyond):
+    """The mesh with hexahedra of first order beyond a place along x."""
+    nodes = mesh.blocks[0].nodes
+    far = mesh.points[nodes].mean(axis=1)[:, 0] > beyond
+    parts = nodes[~far], nodes[far][:, :8]
+    used, new = np.unique(np.concatenate([part.ravel() for part in parts]), return_inverse=True)
+    whole, corners = np.split(new.ravel(), [parts[0].size])
+    blocks = Block("hex20", whole.reshape(-1, 20)), Block("hex8", corners.reshape(-1, 8))
+    return Mesh(mesh.points[used], blocks, {}, {}, {})
+
+
+def test_elements_that_do_not_fit_are_told():
+    """Four edges of the face between elements of two orders; a quadrilateral of one that is two triangles of others."""
+    first = misfit_doubts(of_first_order(box_mesh("hex20", (1, 1, 1), (2, 1, 1)), 0.5))
+    assert "4 edges have a node in the middle for some" in first[0]
+    assert len(first) == 1
+    one, other = box_mesh("hex8", (1, 1, 1), (1, 1, 1)), box_mesh("tet4", (1, 1, 1), (1, 1, 1))
+    points = np.concatenate([one.points, other.points + np.array([1.0, 0, 0])])
+    beside = Block("tet4", other.blocks[0].nodes + len(one.points))
+    second = misfit_doubts(merged(Mesh(points, (*one.blocks, beside), {}, {}, {})))
+    assert (
+        "1 faces are quadrilaterals of some elements and triangles of others, the first at (1, 0.5, 0.5) m" in second[0]
+    )
+    assert not misfit_doubts(box_mesh("hex20", (1, 1, 1), (2, 1, 1)))
+    told = mesh_warnings(of_first_order(box_mesh("hex20", (1, 1, 1), (2, 1, 1)), 0.5))
+    assert told == first
 
 
 # ---- formats ------------------------------------------------------------------------------------------------------
@@ -533,6 +580,7 @@ def test_abaqus_includes(deck, tmp_path):
         ("Lower, Upper", "Lower, Both", "refers to the set 'Both'"),
         ("Upper, S2", "77, S2", "side S2 of element 77"),
         ("9, 0., 0., 2.", "8, 0., 0., 2.", "node 8 is defined twice"),
+        ("20, 5, 6, 7, 8,", "10, 5, 6, 7, 8,", "element 10 is defined twice"),
         ("C3D8I", "C3D15", "volume elements of kind 'C3D15'"),
         ("*Mass, elset=Both", "*Instance, name=a, part=p\n1., 0., 0.", "assembly"),
         ("*Mass, elset=Both", "*Include, input=nowhere.inp", "nowhere.inp does not exist"),

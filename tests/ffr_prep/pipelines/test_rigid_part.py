@@ -114,3 +114,27 @@ def test_a_rigid_part_swings_in_a_scene(files):
 def test_what_cannot_be_used(arguments, message, files):
     with pytest.raises(InputError, match=message):
         fp.rigid_part(files["plate"], **{"density": RHO, **arguments})
+
+
+def boxes(occ, second):
+    """Cubes of 10 mm, the second from a place along x."""
+    occ.addBox(0, 0, 0, 10, 10, 10)
+    occ.addBox(second, 0, 0, 10, 10, 10)
+
+
+@pytest.mark.parametrize(("second", "volume"), [(8.0, "200 mm^3"), (10.0, None), (30.0, None)])
+def test_solids_that_overlap_are_told(second, volume, tmp_path):
+    """What touches, or has only boxes in common, is not."""
+    body = fp.rigid_part(written(lambda occ: boxes(occ, second), tmp_path / "two.step"), RHO)
+    assert body.mass == pytest.approx(2 * RHO * 1e-6, rel=1e-9)
+    notes = [note for note in body.provenance["notes"] if "overlap" in note]
+    assert notes == [] if volume is None else f"'volume_1' and 'volume_2' overlap: {volume} count twice" in notes[0]
+
+
+def test_volumes_in_no_group_are_left_out_as_in_a_mesh(tmp_path):
+    script = 'SetFactory("OpenCASCADE");\nBox(1) = {0, 0, 0, 1, 1, 1};\nBox(2) = {2, 0, 0, 1, 1, 1};\n'
+    (tmp_path / "two.geo").write_text(script + 'Physical Volume("part") = {1};\n')
+    body = fp.rigid_part(tmp_path / "two.geo", 1000.0)
+    assert body.mass == pytest.approx(1000.0 * 1.0)
+    assert any("in no physical group" in note for note in body.provenance["notes"])
+    assert np.ptp(body.surface.points[:, 0]) == pytest.approx(1.0)

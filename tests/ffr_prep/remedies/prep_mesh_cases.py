@@ -46,7 +46,11 @@ OPENED = HEX.copy()
 OPENED[1] = np.where((HEX[1] >= 4) & (HEX[1] < 8), HEX[1] + 8, HEX[1])
 HINGED = np.vstack([PLAIN.points, PLAIN.points + np.array((1.0, 0.2, 0.1))])
 AT_CORNER = np.where(HEX + 12 == 12, 11, HEX + 12)
+CENTRE = PLAIN.points[HEX[0]].mean(axis=0)
+FOLDED = np.vstack([PLAIN.points, CENTRE + 0.3 * (PLAIN.points[HEX[0][4:]] - CENTRE)])
+TWICE = np.concatenate([HEX[0][:4], len(PLAIN.points) + np.arange(4)])
 MESHES = [
+    changed(points=FOLDED, blocks=blocks(np.vstack([HEX, TWICE]))),
     changed(blocks=()),
     changed(blocks=blocks(HEX, "hex9")),
     changed(points=moved(0, np.nan)),
@@ -100,6 +104,7 @@ DECKS = [
     of("block.inp", ("1, 0.0", "1, zero")),
     of("block.inp", ("1, 0.0", "2, 0.0")),
     of("block.inp", ("C3D8, ELSET=ALL\n1, 1,", "C3D8, ELSET=ALL\n1, 99,")),
+    of("block.inp", ("C3D8, ELSET=ALL\n1, 1,", "C3D8, ELSET=ALL\n2, 1,")),
     of("block.inp", ("*NODE", "*INCLUDE, INPUT=block.inp\n*NODE")),
     of("block.inp", ("*NODE", "*INSTANCE, NAME=a, PART=p\n1., 0., 0.\n*NODE")),
     of("block.inp", ("TYPE=C3D8", "TYPE=C3D6")),
@@ -134,6 +139,7 @@ MATERIALS = [
     edited(materials, "block.inp", ("SECTION, ELSET", "SECTION, ORIENTATION=o, ELSET")),
     edited(materials, "block.inp", ("*ELASTIC", "*ELASTIC, TYPE=LAMINA")),
     edited(materials, "block.inp", ("2.1e11", "stiff")),
+    edited(materials, "block.inp", ("*DENSITY\n7850.\n", "*DENSITY\n7850.\n*DENSITY\n7800.\n")),
     edited(materials, "block.inp", ("7850.", "7850\0")),
     Case(
         lambda: with_files(lambda: file_materials("mesh.vtu", read_mesh("mesh.vtu")), {}),

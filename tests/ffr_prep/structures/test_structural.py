@@ -26,7 +26,7 @@ from ffr_prep.reduction.methods.craig_bampton import CraigBampton
 from ffr_prep.reduction.methods.eigenmodes import Eigenmodes
 from ffr_prep.structures.beams import axis_functions, beams, field, mass_points, stiffness, undeformed
 from ffr_prep.structures.element_families import beam_elements, families
-from ffr_prep.structures.frame import Frame, Member, check_frame, group_nodes, joined, named, polyline
+from ffr_prep.structures.frame import Frame, Member, check_frame, group_nodes, joined, named, overlap_doubts, polyline
 from ffr_prep.structures.interfaces import couple_frame, tie
 from ffr_prep.structures.model import assemble_frame
 from ffr_prep.structures.sections import (
@@ -524,6 +524,24 @@ def test_joined_frames_share_their_nodes():
     np.testing.assert_array_equal(again.node_groups["c"], frame.node_groups["c"])
     with pytest.raises(InputError, match="9 elements are there more than once"):
         check_frame(again)
+
+
+def test_members_that_lie_on_one_another_are_told():
+    """With other nodes between: a finer line on a coarse one, triangles on quadrilaterals. What is beside is not."""
+    member, corners = Member(circle(0.01), STEEL), [(0, 0, 0), (1, 0, 0), (1, 0.5, 0), (0, 0.5, 0)]
+    line, coarse = polyline(corners[:2], member, elements=4), polyline(corners[:2], member, elements=2)
+    beside = polyline(corners[:2], Member(shifted(circle(0.01), 0.02, 0.0), STEEL, (0, 1, 0)), elements=2)
+    sheet, on = (fp.panel(corners, fp.Shell(0.002, STEEL), elements=(2, 1)) for _ in range(2))
+    on = fp.triangulated(on)
+    assert overlap_doubts(joined(line, polyline([corners[1], (2, 0, 0)], member))) == []
+    assert overlap_doubts(joined(line, beside)) == []
+    assert overlap_doubts(joined(sheet, line)) == []
+    (beams,) = overlap_doubts(joined(line, coarse))
+    assert beams.startswith("4 pairs of beams lie on one another, the first at (0.125, 0, 0) m: each counts")
+    (plates,) = overlap_doubts(joined(sheet, on))
+    assert plates.startswith("4 pairs of plates lie on one another")
+    frame = named(joined(line, coarse), a=(0, 0, 0))
+    assert fp.from_frame(frame, [InterfaceRegion("a")]).record["warnings"] == [beams]
 
 
 def test_closed_polyline():

@@ -1,0 +1,55 @@
+"""A body with fewer of its elastic coordinates, and with what is known of them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from ffr_prep.body.constructors import recombined
+from ffr_prep.body.mesh_error import MESH_ERROR, mesh_errors_of
+from ffr_prep.body.reduced import BodyError, FlexibleBody
+from ffr_prep.body.steady_stress import of_fewer_shapes
+from ffr_prep.common.arrays import Array
+
+
+def truncated(body: FlexibleBody, modes: int | Array) -> FlexibleBody:
+    """The body with only its first ``modes`` elastic coordinates, or those of the indices (k,) in `modes`; so are its parts.
+
+    Raises BodyError for a mode that does not exist or is listed twice.
+
+    >>> small = fd.truncated(body, 4)
+    """
+    if np.ndim(modes) == 0 and not 0 <= int(modes) <= body.n:
+        raise BodyError(f"body {body.name!r} has {body.n} modes; asked to keep the first {int(modes)}")
+    keep = np.arange(int(modes)) if np.ndim(modes) == 0 else np.asarray(modes, int)
+    unknown = keep[(keep < 0) | (keep >= body.n)]
+    if unknown.size or np.unique(keep).size < keep.size:
+        raise BodyError(
+            f"body {body.name!r} has {body.n} modes, counted from 0; asked to keep {keep.tolist()}: each must exist "
+            "and be named once"
+        )
+    return replace(
+        body,
+        P_dm=body.P_dm[:, keep],
+        rP_dm=body.rP_dm[:, :, keep],
+        PP_dm=body.PP_dm[:, :, keep][:, :, :, keep],
+        omega2=body.omega2[keep],
+        interfaces=tuple(replace(i, phi_t=i.phi_t[:, keep], phi_r=i.phi_r[:, keep]) for i in body.interfaces),
+        surface=body.surface and recombined(body.surface, np.eye(body.n)[:, keep], body.surface.Phi[:, :, keep]),
+        stiffening=None if body.stiffening is None else body.stiffening[:, keep][:, :, keep],
+        damping=None if body.damping is None else body.damping[np.ix_(keep, keep)],
+        provenance=_of_modes(of_fewer_shapes(body, np.eye(body.n)[:, keep]), keep),
+        parts=tuple(truncated(part, modes if np.ndim(modes) else min(int(modes), part.n)) for part in body.parts),
+    )
+
+
+def _of_modes(provenance: Mapping[str, Any], keep: Array) -> Mapping[str, Any]:
+    """With what is known of single modes under the numbers that these have among those that are kept."""
+    known = mesh_errors_of(provenance)
+    found = {new + 1: known[int(old) + 1] for new, old in enumerate(keep) if int(old) + 1 in known}
+    if not known:
+        return provenance
+    return {**provenance, MESH_ERROR: {"modes": list(found), "too_high": list(found.values())}}
