@@ -15,7 +15,7 @@ import numpy as np
 
 from ffr_dyn.analyses.forward import forward
 from ffr_dyn.analyses.kinematic import kinematic, undeformed
-from ffr_dyn.analyses.outcome import efforts, needed, only, result_of, with_quantities
+from ffr_dyn.analyses.outcome import efforts, efforts_told, needed, only, result_of, with_quantities
 from ffr_dyn.analyses.registry import OverTime, option
 from ffr_dyn.analyses.settings import Settings
 from ffr_dyn.consistency.assemble import Assembled, assemble, flattened
@@ -109,7 +109,8 @@ def inverse(
         scene, end=end, output_step=output_step, method=elastic.method, start=start,
         stabilisation=elastic.stabilisation, outputs=needed(scene, outputs), path=path, progress=progress,
     )  # fmt: skip
-    named = replace(result, attributes={**result.attributes, "analysis": "inverse dynamics"})
+    told = efforts_told(scene, result, {})
+    named = replace(result, attributes={**told, "analysis": "inverse dynamics"})
     return with_quantities(only(named, scene, outputs), efforts(flattened(scene, start)[0], named), path)
 
 
