@@ -12,6 +12,7 @@ import numpy as np
 
 from ffr_dyn.analyses.integration import geometry
 from ffr_dyn.compile.scene_tables import System
+from ffr_dyn.consistency.evaluation import joined
 from ffr_dyn.consistency.step_error import Beside, step_errors, worst
 from ffr_dyn.functions.rotation import rotation_matrix
 from ffr_dyn.kernels.tables import Record
@@ -40,12 +41,17 @@ def result_of(
     attributes: dict[str, Any],
     path: str | Path | None = None,
     outputs: Sequence[str] = ("default",),
+    way: Sequence[Record] = (),
 ) -> Result:
     """Quantities of recorded states, efforts of the drivers included; written to `path` when it is complete.
 
     outputs : names or patterns; beside them every result has the quantities of `accompanying` and the efforts
+    way     : states on the way to the first, on which joint angles count their turns
     """
-    quantities, _ = measure(View(system, record), {}, selected(system, needed(system.scene, outputs)))
+    wanted = selected(system, needed(system.scene, outputs))
+    angles = {name: entry for name, entry in wanted.items() if way and name.endswith(".angle")}
+    before = measure(View(system, joined(list(way))), {}, angles)[1] if angles else {}
+    quantities, _ = measure(View(system, record), before, wanted)
     plain = Result(record.time, quantities, geometry(system.scene), attributes)
     return with_quantities(only(plain, system.scene, outputs), efforts(system.scene, plain), path)
 
