@@ -285,7 +285,9 @@ def _notes(near: Chart, steady: Steady | None, values: Array) -> list[str]:
     v = to_global_axes(place, near.x, near.V)
     left = near.Z @ rates(near, near.x, v)[near.steps.size :] / sizes(at)
     applied = np.linalg.solve(near.M, evaluate(at, near.time, near.x, v).force) / sizes(at)
-    rounding = ROUNDED * max(1.0, float(np.abs(values).max(initial=0.0)) ** 2)  # of springs, also where they hold a load
+    rounding = ROUNDED * max(
+        1.0, float(np.abs(values).max(initial=0.0)) ** 2
+    )  # of springs, also where they hold a load
     if np.abs(left).max() <= STATIONARY * max(rounding, float(np.abs(applied).max()), float(np.abs(near.V).max()) ** 2):
         return []
     return ["the state is no equilibrium and no steady rotation: the eigenvalues describe its next moment only"]

@@ -12,7 +12,6 @@ import numpy as np
 
 from ffr_dyn.analyses.integration import geometry
 from ffr_dyn.compile.scene_tables import System
-from ffr_dyn.consistency.evaluation import joined
 from ffr_dyn.consistency.step_error import Beside, step_errors, worst
 from ffr_dyn.functions.rotation import rotation_matrix
 from ffr_dyn.kernels.tables import Record
@@ -41,19 +40,29 @@ def result_of(
     attributes: dict[str, Any],
     path: str | Path | None = None,
     outputs: Sequence[str] = ("default",),
-    way: Sequence[Record] = (),
+    near: Mapping[str, Array] | None = None,
 ) -> Result:
     """Quantities of recorded states, efforts of the drivers included; written to `path` when it is complete.
 
     outputs : names or patterns; beside them every result has the quantities of `accompanying` and the efforts
-    way     : states on the way to the first, on which joint angles count their turns
+    near    : joint angles (T,), within half a turn, where more is known of their turns than rows tell (`turned_along`)
     """
-    wanted = selected(system, needed(system.scene, outputs))
-    angles = {name: entry for name, entry in wanted.items() if way and name.endswith(".angle")}
-    before = measure(View(system, joined(list(way))), {}, angles)[1] if angles else {}
-    quantities, _ = measure(View(system, record), before, wanted)
+    quantities, _ = measure(View(system, record), {}, selected(system, needed(system.scene, outputs)))
+    for name, angles in (near or {}).items():
+        if name in quantities:
+            found = quantities[name].values
+            turns = 2 * np.pi * np.round((angles - found) / (2 * np.pi))
+            quantities[name] = replace(quantities[name], values=found + turns)
     plain = Result(record.time, quantities, geometry(system.scene), attributes)
     return with_quantities(only(plain, system.scene, outputs), efforts(system.scene, plain), path)
+
+
+def turned_along(system: System, way: Record, rows: Sequence[int]) -> dict[str, Array]:
+    """Joint angles (rows,) by name, which count their turns from state to state on a way, of which some are rows."""
+    entries = selected(system, ("default",))
+    named = {f"{joint.name}.angle" for joint in system.scene.joints}
+    angles, _ = measure(View(system, way), {}, {name: entry for name, entry in entries.items() if name in named})
+    return {name: quantity.values[list(rows)] for name, quantity in angles.items()}
 
 
 def accompanying(scene: Scene) -> tuple[str, ...]:
@@ -115,7 +124,7 @@ def efforts_told(scene: Scene, result: Result, more: Mapping[str, str]) -> dict[
     """
     coordinates = {driver.name: driver.coordinate for driver in scene.drivers if isinstance(driver, Driver)}
     kinds = {"angle": "moment", "stroke": "force"}
-    same = {f"{name}.effort": f"{name}.{kinds[coordinate]}" for name, coordinate in coordinates.items()} | more
+    same = {**{f"{name}.effort": f"{name}.{kinds[coordinate]}" for name, coordinate in coordinates.items()}, **more}
     known = result.attributes.get("errors", {})
     told = {name: known[same.get(of, of)] for name, of in same.items() if same.get(of, of) in known}
     return {**result.attributes, "errors": {**known, **told}}

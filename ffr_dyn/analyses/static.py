@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ffr_dyn.analyses.integration import with_all_reactions
-from ffr_dyn.analyses.outcome import result_of
+from ffr_dyn.analyses.outcome import result_of, turned_along
 from ffr_dyn.analyses.registry import OfMoment
 from ffr_dyn.analyses.settings import MomentSettings
 from ffr_dyn.analyses.states import held
@@ -27,6 +27,7 @@ from ffr_dyn.consistency.evaluation import (
     evaluate,
     evaluator,
     free_motions,
+    joined,
     record_states,
     total_mass_matrix,
 )
@@ -153,6 +154,8 @@ def _result(
     for x in found.path[:-1]:  # angles count their turns on it, those of forces and of joints
         evaluate(at, time, x, still)
         way.append(copied(at.record))
+    evaluate(at, time, found.path[-1], still)
+    near = turned_along(at.system, joined([*way, copied(at.record)]), [-1])
     record = with_all_reactions(assembled, record_states(at, np.array([time]), found.path[-1:], still[None]))
     lowest, flutter, branch = seen
     stable = lowest > 0 and not flutter
@@ -174,4 +177,4 @@ def _result(
         "status": "complete",
     }
     attributes = {key: value for key, value in attributes.items() if value is not None}
-    return result_of(assembled.system, record, attributes, path, outputs, way)
+    return result_of(assembled.system, record, attributes, path, outputs, near)
