@@ -23,6 +23,7 @@ from ffr_dyn.analyses.inversion.bounded import Bounded, Found, bounded_solution
 from ffr_dyn.analyses.inversion.internal_dynamics import fitting, internal
 from ffr_dyn.analyses.inversion.plant import Plant, plant, slopes, with_efforts
 from ffr_dyn.analyses.inversion.servo import ServoMotion, at_moment, internal_values, servo, slope, slope_matrix
+from ffr_dyn.analyses.inversion.turns import not_counted
 from ffr_dyn.analyses.outcome import (
     efforts,
     efforts_told,
@@ -265,7 +266,7 @@ def _not_collocated(
         "evaluations": int(own.at.work.info[EVALUATIONS] + whole.free.work.info[EVALUATIONS]),
         "degrees_of_freedom": own.size,
         "internal_coordinates": list(own.names),
-        "notes": [*assembled.notes, *notes, *doubted],
+        "notes": [*assembled.notes, *notes, *doubted, *not_counted(own.angles, record)],
         "status": "complete",
     }
     result = _measured(whole, record, found, attributes, outputs)
@@ -350,14 +351,16 @@ def _integrated(
         moments.append(at_moment(own, float(time), w, moments[-1].x))
         if progress is not None:
             progress(float(time))
-    return Found(np.array([moment.u for moment in moments]), [(moment.x, moment.v) for moment in moments])
+    states, measured = [(moment.x, moment.v) for moment in moments], [moment.measured for moment in moments]
+    return Found(np.array([moment.u for moment in moments]), states, measured)
 
 
 def _recorded(of: Plant, times: Array, found: Found) -> Record:
     """The states, with the efforts."""
     rows = []
-    for time, u, (x, v) in zip(times, found.u, found.states, strict=True):
+    for time, u, (x, v), measured in zip(times, found.u, found.states, found.measured, strict=True):
         here = sized(of.free, of.own.unknown, u)
+        here.work.loads.reference[:] = measured
         row = record_states(here, np.clip([time], *of.own.span), x[None], v[None])
         rows.append(row._replace(time=np.array([time])))
     return joined(rows)

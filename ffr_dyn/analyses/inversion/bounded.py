@@ -98,10 +98,11 @@ class _End:
 
 @dataclass(frozen=True)
 class Found:
-    """What holds at output times: u (T, U), states (x, v)."""
+    """What holds at output times: u (T, U), states (x, v), what forces have measured at each, with its turns."""
 
     u: Array
     states: list[tuple[Array, Array]]
+    measured: list[Array]
 
 
 def bounded_solution(
@@ -149,7 +150,7 @@ def _found(of: Plant, times: Array, path: Path, parts: int) -> Found:
         look(of, float(t), *w)
         for t, *w in zip(times[keep], path.y[keep], rates[keep], path.u[keep], path.near[keep], strict=True)
     ]
-    return Found(path.u[keep], [(now.x, now.v) for now in looks])
+    return Found(path.u[keep], [(now.x, now.v) for now in looks], [now.measured for now in looks])
 
 
 def _whole(span: float, output_step: float) -> int:
