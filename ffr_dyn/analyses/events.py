@@ -2,13 +2,18 @@
 
 Every step of the integrator is looked at (ten states from row to row where it chooses its steps). Where the quantity has
 passed the value within one, the step is done again, from the same state and shorter, until its end is the event: a root of
-one unknown, the length of the step, which Brent's method (1973) finds to the rounding of the time. So an event is as accurate
-as the method, and lies on the constraints as it does.
+one unknown, the length of the step, which Brent's method (1973) finds to the rounding of the time. ROS2 does it again where a
+method goes on from what it remembers, or iterates on positions, which is lost in rounding in so short a step. So an event is
+as accurate as the method, and lies on the constraints as it does.
+
+How accurate that is, the same events of runs with other steps tell, as they tell the error of every output. Where a quantity
+vibrates at a frequency that steps do not resolve, it is its amplitude over the rate at which the quantity passes the value:
+a single moment catches vibration in some phase.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, replace
 from difflib import get_close_matches
 from typing import Any, Literal
@@ -21,15 +26,20 @@ from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.compile.workspace import new_record
 from ffr_dyn.consistency.assemble import Assembled
 from ffr_dyn.consistency.failure import Settings, failure
+from ffr_dyn.consistency.step_error import Beside, StepError, step_errors
 from ffr_dyn.equations.state_view import StateView
-from ffr_dyn.integrators import Integrator
+from ffr_dyn.integrators import ROS2, Integrator
 from ffr_dyn.kernels.tables import OK, Record
 from ffr_dyn.results.quantities import catalogue
 from ffr_dyn.results.recorded_motion import View
+from ffr_dyn.results.result import Quantity, Result
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 
 WIDTH = 4 * np.finfo(float).eps  # of a step, and relative: what brentq can reach
+ROUNDING = 1e-14  # of the times of a run: no moment is known better
+SHOWN = 3  # times in a note
+_FINER = "take a smaller step, or a value that is passed faster"
 
 
 @dataclass(frozen=True)
@@ -70,16 +80,19 @@ _Seen = Callable[[Record, Any], tuple[Array, Any]]
 
 @dataclass(frozen=True)
 class _Crossing:
-    """An event between rows `row` - 1 and `row`; `memory` is of the rows up to the first of them."""
+    """An event between rows `row` - 1 and `row`, between which the quantity has a mean rate; `memory` is of the rows up to
+    the first of them."""
 
     number: int
     row: int
     rising: bool
+    rate: float
     memory: Any
 
 
 class Watcher:
-    """Looks for events in the rows of a run, one for each step. `found` lists them as plain data."""
+    """Looks for events in the rows of a run, one for each step. `found` lists them as plain data; `ended_by` is the name of
+    the one that has ended the run."""
 
     def __init__(
         self,
@@ -90,6 +103,7 @@ class Watcher:
         events: Sequence[Event],
     ) -> None:
         self.events, self.found = tuple(events), list[dict[str, Any]]()
+        self.ended_by: str | None = None
         system = assembled.system
         self._seen = [_seen(system, event) for event in self.events]
         self._system, self._method, self._gains, self._spacing = system, method, gains, spacing
@@ -114,6 +128,7 @@ class Watcher:
         for found, event, row, at_event in located:
             self.found.append(found)
             if event.stop:
+                self.ended_by = event.name
                 before = [column[1:row] for column in joined]
                 return Record(*(np.concatenate(pair) for pair in zip(before, at_event, strict=True))), True
         self._memory = [seen(joined, memory)[1] for seen, memory in zip(self._seen, self._memory, strict=True)]
@@ -127,7 +142,10 @@ class Watcher:
             wanted = {"rising": rises, "falling": falls, "either": rises | falls}[event.direction]
             for k in np.flatnonzero(wanted).tolist():
                 before = Record(*(column[: k + 1] for column in rows))
-                yield _Crossing(number, k + 1, bool(rises[k]), self._seen[number](before, self._memory[number])[1])
+                rate = float(values[k + 1] - values[k]) / float(rows.time[k + 1] - rows.time[k])
+                yield _Crossing(
+                    number, k + 1, bool(rises[k]), rate, self._seen[number](before, self._memory[number])[1]
+                )
 
     def _located(self, rows: Record, crossing: _Crossing) -> tuple[dict[str, Any], Event, int, Record]:
         """The event as plain data, its declaration, the row that follows it, and a row of its own."""
@@ -145,8 +163,10 @@ class Watcher:
         own = self._redone(rows, k, length)
         found = {
             "event": event.name,
+            "quantity": event.quantity if isinstance(event.quantity, str) else "a function",
             "time": float(own.time[0]),
             "rising": crossing.rising,
+            "rate": crossing.rate,
             "x": own.x[0].tolist(),
             "v": own.v[0].tolist(),
         }
@@ -154,7 +174,9 @@ class Watcher:
 
     def _redone(self, rows: Record, k: int, length: float) -> Record:
         """A row at the end of one step of this length, or of a run where the method chooses its steps, from row k."""
-        method: Any = self._method if self._method.controlled else replace(self._method, step=length)  # type: ignore[type-var]
+        method: Any = self._method
+        if not method.controlled:
+            method = replace(method, step=length) if method.repeatable else ROS2(length)
         time, end = float(rows.time[k]), new_record(self._system, 1)
         engine = new_engine(self._system, rows.x[k], rows.v[k], method, self._gains, start=time, spacing=length)
         engine.work.loads.reference[:] = rows.forces[k]
@@ -195,3 +217,74 @@ def _function(system: System, function: Callable[[float, StateView], float]) -> 
         return np.array([float(function(t, StateView(system.scene, system.layout, x, v))) for t, x, v in rows]), None
 
     return values
+
+
+# ---- how accurate the moments are -------------------------------------------------------------------------------------
+
+
+def with_errors(
+    run: Result, errors: Mapping[str, StepError], other: Beside | None, order: float, twins: Sequence[Beside]
+) -> list[dict[str, Any]]:
+    """The events of a run with the "error" [s] of each moment; None where a run with other steps does not pass it.
+
+    errors              : of the outputs of the run
+    other, order, twins : further runs, with the same events, as for `step_errors`
+    """
+    found, beside = run.attributes["events"], [*([] if other is None else [other]), *twins]
+    times = [_of_the_same(found, one.result.attributes["events"]) for one in beside]
+    sure = [k for k in range(len(found)) if all(other_times[k] is not None for other_times in times)]
+    own, *others = (_moments(run, [at[k] for k in sure]) for at in ([event["time"] for event in found], *times))
+    told = [Beside(moments, one.ratio) for moments, one in zip(others, beside, strict=True)]
+    off = step_errors(own, None, order, told) if other is None else step_errors(own, told[0], order, told[1:])
+    known = {k: max(off[str(n)].error, _shaken(found[k], errors)) for n, k in enumerate(sure)}
+    least = ROUNDING * max(1e-300, *np.abs(run.time[[0, -1]]))
+    return [event | {"error": max(least, known[k]) if k in known else None} for k, event in enumerate(found)]
+
+
+def _of_the_same(own: Sequence[Mapping[str, Any]], other: Sequence[Mapping[str, Any]]) -> list[float | None]:
+    """When another run has each event of a run: the moments that are nearest to each other, of one event and direction."""
+
+    def nearest(event: Mapping[str, Any], among: Sequence[Mapping[str, Any]]) -> Mapping[str, Any] | None:
+        alike = (one for one in among if all(one[key] == event[key] for key in ("event", "rising")))
+        return min(alike, key=lambda one: abs(one["time"] - event["time"]), default=None)
+
+    pairs = ((event, nearest(event, other)) for event in own)
+    return [one["time"] if one is not None and nearest(one, own) is event else None for event, one in pairs]
+
+
+def _moments(run: Result, times: Sequence[Any]) -> Result:
+    """Times [s] as outputs of two rows, from the start of a run to each."""
+    start = float(run.time[0])
+    return Result(
+        np.array([0.0, 1.0]), {str(k): Quantity(np.array([start, time]), "s") for k, time in enumerate(times)}
+    )
+
+
+def _shaken(event: Mapping[str, Any], errors: Mapping[str, StepError]) -> float:
+    """[s] by which vibration that steps do not resolve moves an event."""
+    name = event["quantity"]
+    told = errors.get(name) or errors.get(name.rpartition(".")[0])
+    return told.error / abs(event["rate"]) if told is not None and told.vibrates and event["rate"] else 0.0
+
+
+def doubts(events: Sequence[Mapping[str, Any]], end: float, further: Sequence[Result]) -> list[str]:
+    """Notes on events that not all runs with other steps pass, and on those that only these pass before the `end` [s]."""
+    gone, missed = dict[str, list[float]](), dict[str, list[float]]()
+    for event in events:
+        if event["error"] is None:
+            gone.setdefault(event["event"], []).append(event["time"])
+    for run in further:
+        theirs = run.attributes["events"]
+        for event, own in zip(theirs, _of_the_same(theirs, events), strict=True):
+            if own is None and event["time"] < end:
+                missed.setdefault(event["event"], []).append(event["time"])
+    doubtful = (
+        f"{_named(*of, 'at')} is in doubt: a run with other steps does not pass it; {_FINER}" for of in gone.items()
+    )
+    more = (f"{_named(*of, 'may happen at')}, too, as in a run with other steps; {_FINER}" for of in missed.items())
+    return [*doubtful, *more]
+
+
+def _named(name: str, times: Sequence[float], words: str) -> str:
+    at = ", ".join(f"{time:.6g}" for time in sorted(times)[:SHOWN])
+    return f"event {name!r} {words} t = {at}{', ...' * (len(times) > SHOWN)} s"

@@ -16,7 +16,7 @@ from typing import Any, ClassVar, Literal, get_args
 
 import numpy as np
 
-from ffr_dyn.analyses.events import Event
+from ffr_dyn.analyses.events import Event, doubts, with_errors
 from ffr_dyn.analyses.integration import LOOKS, check_method, check_output_step, evaluation_cost, fast_within, integrate
 from ffr_dyn.analyses.registry import OverTime, option
 from ffr_dyn.analyses.rotating.periodic import periodically
@@ -37,6 +37,7 @@ from ffr_dyn.consistency.step_error import (
     from_rounding,
     larger,
     of_the_range,
+    on_shared_rows,
     order_shown,
     percent,
     step_errors,
@@ -165,7 +166,8 @@ class _Runs:
         They go on at the same time, and progress is their mean; one after another beside a stopwatch, and with the user's
         Python functions, which would be called out of order.
         """
-        lonely = self.how["stopwatch"] is not None or self.assembled.system.user.count
+        watched = any(callable(event.quantity) for event in self.how["events"])
+        lonely = self.how["stopwatch"] is not None or self.assembled.system.user.count or watched
         progress, found, times = self.how["progress"], dict[int, Any](), [self.start] * len(calls)
 
         def heard(number: int, time: float) -> None:
@@ -224,13 +226,13 @@ def forward(
     check_method(method)
     assembled = begun(assemble(scene, time=start) if assembled is None else assembled, start, begin, method)
     common: dict[str, Any] = {"start": start, "end": end, "output_step": output_step, "stabilisation": stabilisation}
-    common |= {"outputs": outputs, "progress": progress, "stopwatch": stopwatch}
+    common |= {"outputs": outputs, "events": events, "progress": progress, "stopwatch": stopwatch}
     wanted = Within() if method is None else method
     if isinstance(wanted, Within) or stabilisation == Projection():
         common["stabilisation"] = _tight(stabilisation, getattr(wanted, "accuracy", Within().accuracy))
     common["fast"] = _fast(assembled.system, wanted, start, end, output_step)
     runs = _Runs(scene, assembled, start, output_step, common, begin)
-    kept = {"events": events, "path": path, "resume": resume}
+    kept = {"path": path, "resume": resume}
     method, count = _resumed(resume, wanted, output_step)
     if isinstance(method, Within):
         return _searched(runs, method, kept, count)
@@ -290,6 +292,8 @@ class _Trial:
     result: Result
     twins: tuple[Beside, ...] = ()
     errors: Mapping[str, StepError] = field(default_factory=dict)
+    events: Sequence[Mapping[str, Any]] = ()  # with their errors, and notes on them
+    doubts: Sequence[str] = ()
 
 
 def _checked(
@@ -319,7 +323,17 @@ def _with_twin(
     found, others = outcomes[: len(twin)], outcomes[len(twin) :]
     if not found or _failed(found[0]):
         return _Trial(method, count, result), others
-    return _Trial(method, count, result, tuple(found), step_errors(result, None, SURE, found)), others
+    return _Trial(method, count, result, tuple(found), _errors(result, None, SURE, found)), others
+
+
+def _errors(result: Result, other: Beside | None, order: float, twins: Sequence[Beside]) -> dict[str, StepError]:
+    """`step_errors` by the rows that all runs share; none where these are too few."""
+    beside = [*([] if other is None else [other]), *twins]
+    run, *others = on_shared_rows([result, *(one.result for one in beside)])
+    if run.time.size < 2:
+        return {}
+    told = [Beside(rows, one.ratio) for rows, one in zip(others, beside, strict=True)]
+    return step_errors(run, None, order, told) if other is None else step_errors(run, told[0], order, told[1:])
 
 
 def _granted(outcome: Any) -> Any:
@@ -347,11 +361,23 @@ def _told(runs: _Runs, trial: _Trial, other: Any, *longer: Any) -> _Trial:
     if runs.feels:
         order = min(order, order_shown(trial.result, other, farther, order))
     twins = (*trial.twins, *(twin for twin in longer if not _failed(twin)))
-    errors = step_errors(trial.result, other, order, twins)
+    errors = _errors(trial.result, other, order, twins)
     if farther is not None:
-        errors = larger(errors, step_errors(trial.result, farther, order))
+        errors = larger(errors, _errors(trial.result, farther, order))
     start = _start(runs, trial.method, trial.result, trial.twins[0]) if trial.twins else ()
-    return replace(trial, twins=twins, errors=with_start(errors, trial.result, *start) if start else errors)
+    errors = with_start(errors, trial.result, *start) if start else errors
+    return replace(trial, twins=twins, errors=errors, **_moments(trial.result, errors, other, order, twins))
+
+
+def _moments(
+    result: Result, errors: Mapping[str, StepError], other: Beside, order: float, twins: Sequence[Beside]
+) -> dict[str, Any]:
+    """The events of a run with their errors, if it has looked for any, and doubts about them."""
+    if "events" not in result.attributes or not errors:
+        return {}
+    events = with_errors(result, errors, other, order, twins)
+    further = [one.result for one in (other, *twins)]
+    return {"events": events, "doubts": doubts(events, float(result.time[-1]), further)}
 
 
 def _further(
@@ -413,13 +439,13 @@ def _twin(runs: _Runs, method: Integrator, share: float, say: Say) -> Beside:
 def _start(runs: _Runs, method: Integrator, result: Result, twin: Beside) -> tuple[Result, ...]:
     """The steps to the first row and a little beyond as rows, and those of a twin with half the twin's step, where what
     vibrates then is gone soon; () elsewhere, and where they fail."""
-    if not begins_alone(result, twin.result):
+    if not begins_alone(*on_shared_rows([result, twin.result])):
         return ()
     count = round(runs.output_step / method.step)
     steps = min(count + math.ceil(BEYOND * count), round((runs.how["end"] - runs.start) / method.step))
     share = 0.5 * twin.ratio * method.step
     fine = Twin(share, lasting(runs.vibrations, share))
-    span = {"output_step": method.step, "end": runs.start + steps * method.step, "progress": None}
+    span = {"output_step": method.step, "end": runs.start + steps * method.step, "progress": None, "events": ()}
     try:
         return runs.run(method, **span), runs.run(fine, **span)
     except (ComputationError, InputError):  # the latter where steps are rounding beside the time of the start
@@ -448,10 +474,11 @@ def _finished(runs: _Runs, trial: _Trial, path: str | Path | None, ringing: Set[
         *_coarse(result),
         *_unstable(result, grown),
         *(_left(runs, trial) if trial.errors and not grown else ()),
+        *trial.doubts,
     ]
     trial = replace(trial, errors={name: _by_chance(e, grown.get(name, 0.0)) for name, e in trial.errors.items()})
     told = {name: [e.error, e.of_range] for name, e in trial.errors.items()}
-    more: dict[str, Any] = {"notes": notes, "errors": told}
+    more: dict[str, Any] = {"notes": notes, "errors": told} | ({"events": trial.events} if trial.events else {})
     if trial.errors:
         more["accuracy"] = _at_least(trial.errors) if unseen else worst(trial.errors)
         more["effort"] = sum(runs.work) / max(1, result.attributes["evaluations"])
@@ -567,7 +594,7 @@ def _departures(runs: _Runs, result: Result, fine: int, steps: int) -> dict[str,
         states = still, pushed(still, runs.start, lasts)
     except ComputationError:
         return None
-    more = {"output_step": row, "outputs": places(still.system), "stopwatch": None}
+    more = {"output_step": row, "outputs": places(still.system), "stopwatch": None, "events": ()}
     calls = [
         lambda say, one=one: replace(runs, assembled=one).run(Twin(row / steps), **more, progress=say) for one in states
     ]

@@ -25,6 +25,7 @@ from ffr_dyn.consistency.doubts import BALANCE, SINGULAR, Seen, between_rows, en
 from ffr_dyn.consistency.evaluation import joined
 from ffr_dyn.consistency.explicit_forces import told
 from ffr_dyn.consistency.following import LOST, STALLED, Lost, jumped, lost_driver, unfollowed
+from ffr_dyn.consistency.step_error import ENDED_BY
 from ffr_dyn.consistency.validity import meaningless
 from ffr_dyn.functions.stopwatch import Stopwatch
 from ffr_dyn.integrators import Integrator, methods
@@ -140,7 +141,7 @@ def integrate(
                 writer.append(times, {name: quantity.values for name, quantity in part.items()}, _checkpoint(run, mark))
             if progress is not None:
                 progress(float(times[-1]))
-        account = _account(run, header["notes"]) | ({} if watcher is None else {"events": watcher.found})
+        account = _account(run, header["notes"]) | ({} if watcher is None else _passed(watcher))
         if writer is not None:
             writer.close("complete", header | account)
     return _result(scene, run, header | account | {"status": "complete"})
@@ -403,6 +404,11 @@ def _watcher(
     watcher = Watcher(assembled, method, gains(stabilisation), spacing, events)
     watcher.begin(run.engine, float(run.kept.times[0][0]))
     return watcher
+
+
+def _passed(watcher: Watcher) -> dict[str, Any]:
+    """The attributes on events."""
+    return {"events": watcher.found} | ({} if watcher.ended_by is None else {ENDED_BY: watcher.ended_by})
 
 
 def reached(engine: Engine, start: float) -> float:

@@ -14,8 +14,8 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from ffr_dyn.analyses.forward import forward
-from ffr_dyn.analyses.kinematic import kinematic, undeformed
-from ffr_dyn.analyses.outcome import efforts, needed, only, result_of, with_quantities
+from ffr_dyn.analyses.kinematic import Followed, along_the_path, undeformed
+from ffr_dyn.analyses.outcome import efforts, efforts_told, needed, only, result_of, with_quantities
 from ffr_dyn.analyses.registry import OverTime, option
 from ffr_dyn.analyses.settings import Settings
 from ffr_dyn.consistency.assemble import Assembled, assemble, flattened
@@ -109,7 +109,8 @@ def inverse(
         scene, end=end, output_step=output_step, method=elastic.method, start=start,
         stabilisation=elastic.stabilisation, outputs=needed(scene, outputs), path=path, progress=progress,
     )  # fmt: skip
-    named = replace(result, attributes={**result.attributes, "analysis": "inverse dynamics"})
+    told = efforts_told(scene, result, {})
+    named = replace(result, attributes={**told, "analysis": "inverse dynamics"})
     return with_quantities(only(named, scene, outputs), efforts(flattened(scene, start)[0], named), path)
 
 
@@ -124,15 +125,15 @@ def _quasi_static(
     progress: Callable[[float], None] | None,
 ) -> Result:
     """At every output time: the undeformed motion, then the deformation at which the elastic accelerations vanish."""
-    start, end, output_step = span
-    assembled = assemble(scene, time=start)
+    assembled = assemble(scene, time=span[0])
     selected(assembled.system, outputs)
-    rigid = kinematic(scene, end=end, output_step=output_step, start=start)
+    rigid = along_the_path(scene, span)
     at, places = evaluator(assembled.system), _coordinates(assembled)
     q, rows = np.zeros(places[1].size), []
     tangent = None
-    for row, time in enumerate(rigid.time):
+    for row, time in enumerate(rigid.record.time):
         x = _undeformed_state(assembled, rigid, row)
+        at.work.loads.reference[:] = rigid.record.forces[row]  # with the turns of the path
         _require_regular(at, float(time), x)
         q, tangent = _deformed(at, places, float(time), x, q, tangent)
         _pose(at, places, float(time), x, q)
@@ -149,7 +150,7 @@ def _quasi_static(
         "notes": [*assembled.notes, *checked("inverse", assembled, record)],
         "status": "complete",
     }
-    return result_of(assembled.system, record, attributes, path, outputs)
+    return result_of(assembled.system, record, attributes, path, outputs, rigid.angles)
 
 
 def _coordinates(assembled: Assembled) -> tuple[Array, Array]:
@@ -166,10 +167,11 @@ def _coordinates(assembled: Assembled) -> tuple[Array, Array]:
     return rigid, elastic
 
 
-def _undeformed_state(assembled: Assembled, rigid: Result, row: int) -> Array:
+def _undeformed_state(assembled: Assembled, rigid: Followed, row: int) -> Array:
     place, x = assembled.system.layout, np.zeros(assembled.system.layout.x_size)
-    for b, body in enumerate(assembled.system.scene.bodies):
-        x[place.R(b)], x[place.p(b)] = rigid[f"{body.name}.R"][row], rigid[f"{body.name}.p"][row]
+    of, there = rigid.assembled.system.layout, rigid.record.x[row]
+    for b in range(len(place.n)):
+        x[place.R(b)], x[place.p(b)] = there[of.R(b)], there[of.p(b)]
     return x
 
 

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from ffr_dyn.analyses.integration import with_all_reactions
-from ffr_dyn.analyses.outcome import output_times, result_of
+from ffr_dyn.analyses.outcome import output_times, result_of, turned_along
 from ffr_dyn.analyses.registry import OverTime
 from ffr_dyn.analyses.settings import Settings
 from ffr_dyn.closing.limits import with_limits
@@ -89,6 +89,39 @@ def kinematic(
 
     >>> result = fd.kinematic(scene, end=0.2, output_step=1e-3)
     """
+    followed = along_the_path(scene, (start, end, output_step), outputs, progress)
+    attributes = {
+        **described(scene),
+        "analysis": "kinematic",
+        "method": "Newton-Raphson",
+        "evaluations": followed.evaluations,
+        "degrees_of_freedom": 0,
+        "notes": followed.notes,
+        "status": "complete",
+    }
+    return result_of(followed.assembled.system, followed.record, attributes, path, outputs, followed.angles)
+
+
+@dataclass(frozen=True)
+class Followed:
+    """The rows of a fully driven scene of undeformed bodies, in which forces have counted the turns of their angles along the
+    path; joint angles (T,) with these turns."""
+
+    assembled: Assembled
+    record: Record
+    angles: dict[str, Array]
+    notes: list[str]
+    evaluations: int
+
+
+def along_the_path(
+    scene: Scene,
+    span: tuple[float, float, float],
+    outputs: Sequence[str] = ("default",),
+    progress: Callable[[float], None] | None = None,
+) -> Followed:
+    """The rows of a scene over a start, an end and an output step [s]; raises what `kinematic` does."""
+    start, end, output_step = span
     rigid = undeformed(scene)
     require_driven(rigid, start, "a kinematic analysis")
     assembled = assemble(rigid, time=start)
@@ -97,25 +130,16 @@ def kinematic(
     pose = replace(
         _pose(at, start, assembled.x, assembled.v), v=to_body_axes(at.system.layout, assembled.x, assembled.v)
     )
-    poses, followed = [pose], [pose]
+    rows, followed = [0], [pose]
     for time in output_times(start, end, output_step)[1:]:
         followed += _follow(at, followed[-1], float(time), output_step)
-        poses.append(followed[-1])
+        rows.append(len(followed) - 1)
         if progress is not None:
             progress(float(time))
-    record = _recorded(assembled, poses)
+    record, angles = _recorded(assembled, followed, rows)
     notes = [*assembled.notes, *_undeformed_notes(scene)]
     notes += doubts.checked("kinematic", assembled, record, {doubts.SINGULAR: _singular_notes(at.system, followed)})
-    attributes = {
-        **described(scene),
-        "analysis": "kinematic",
-        "method": "Newton-Raphson",
-        "evaluations": int(at.work.info[EVALUATIONS]),
-        "degrees_of_freedom": 0,
-        "notes": notes,
-        "status": "complete",
-    }
-    return result_of(assembled.system, record, attributes, path, outputs)
+    return Followed(assembled, record, angles, notes, int(at.work.info[EVALUATIONS]))
 
 
 def undeformed(scene: Scene) -> Scene:
@@ -208,20 +232,28 @@ def _locked(at: Evaluator, pose: _Pose) -> ComputationError:
     )
 
 
-def _recorded(assembled: Assembled, poses: list[_Pose]) -> Record:
-    """Rows of the result, limits where a pose is singular. Raises ComputationError where there are none."""
-    at, best = evaluator(assembled.system), max(pose.conditioning for pose in poses)
-    rows = []
-    for pose in poses:
-        if evaluate(at, pose.time, pose.x, to_global_axes(assembled.system.layout, pose.x, pose.v)).singular:
+def _recorded(assembled: Assembled, followed: list[_Pose], rows: list[int]) -> tuple[Record, dict[str, Array]]:
+    """The rows, which are some of the poses, limits where they are singular, and joint angles. ComputationError where there
+    are none.
+
+    Angles count their turns from pose to pose, since rows may be many turns apart.
+    """
+    at, kept, found = evaluator(assembled.system), set(rows), list[Record]()
+    for number, pose in enumerate(followed):
+        now = evaluate(at, pose.time, pose.x, to_global_axes(assembled.system.layout, pose.x, pose.v))
+        if number in kept and now.singular:
             raise _undetermined(at.system, pose)
-        rows.append(copied(at.record))
-    record = with_limits(assembled.system, assembled.all_rows, with_all_reactions(assembled, joined(rows)))
+        found.append(copied(at.record))
+    angles = turned_along(assembled.system, joined(found), rows)
+    chosen = joined([found[number] for number in rows])
+    record = with_limits(assembled.system, assembled.all_rows, with_all_reactions(assembled, chosen))
+    poses = [followed[number] for number in rows]
+    best = max(pose.conditioning for pose in poses)
     for row, pose in enumerate(poses):
         lost = pose.conditioning < SINGULAR * best and not np.isfinite(record.vd[row]).all()
         if lost or (pose.conditioning < AT_REST and not record.v[row].any()):  # which is on no path
             raise _undetermined(at.system, pose)
-    return record
+    return record, angles
 
 
 def _undetermined(system: System, pose: _Pose) -> ComputationError:

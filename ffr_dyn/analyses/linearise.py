@@ -50,6 +50,7 @@ from ffr_prep.common.errors import ComputationError, InputError
 SHOWN = 12  # modes that a command prints
 BASE = {"base.x": 0, "base.y": 1, "base.z": 2}  # inputs: accelerations of the ground
 SAME = 1e-6  # of matrices at two angles of a steady motion, relative
+ROUNDED = 1e-7  # times this: of a size or a radian, by which an equilibrium in floating point is off
 STATIONARY = 1e-6  # of the accelerations in moving axes, relative to those of the applied forces
 
 
@@ -284,7 +285,9 @@ def _notes(near: Chart, steady: Steady | None, values: Array) -> list[str]:
     v = to_global_axes(place, near.x, near.V)
     left = near.Z @ rates(near, near.x, v)[near.steps.size :] / sizes(at)
     applied = np.linalg.solve(near.M, evaluate(at, near.time, near.x, v).force) / sizes(at)
-    rounding = 1e-9 * max(1.0, float(np.abs(values).max(initial=0.0)) ** 2)  # of springs that are not stretched
+    rounding = ROUNDED * max(
+        1.0, float(np.abs(values).max(initial=0.0)) ** 2
+    )  # of springs, also where they hold a load
     if np.abs(left).max() <= STATIONARY * max(rounding, float(np.abs(applied).max()), float(np.abs(near.V).max()) ** 2):
         return []
     return ["the state is no equilibrium and no steady rotation: the eigenvalues describe its next moment only"]

@@ -19,17 +19,28 @@ import numpy as np
 
 from ffr_dyn.analyses.efforts import Effort, JointEffort, MarkerEffort, sized, unit, with_units
 from ffr_dyn.analyses.forward import forward
-from ffr_dyn.analyses.inversion.bounded import Bounded, bounded_solution
+from ffr_dyn.analyses.inversion.bounded import Bounded, Found, bounded_solution
 from ffr_dyn.analyses.inversion.internal_dynamics import fitting, internal
 from ffr_dyn.analyses.inversion.plant import Plant, plant, slopes, with_efforts
 from ffr_dyn.analyses.inversion.servo import ServoMotion, at_moment, internal_values, servo, slope, slope_matrix
-from ffr_dyn.analyses.outcome import efforts, needed, only, output_times, result_of, with_quantities
+from ffr_dyn.analyses.inversion.turns import not_counted
+from ffr_dyn.analyses.outcome import (
+    efforts,
+    efforts_told,
+    needed,
+    only,
+    output_times,
+    result_of,
+    with_errors,
+    with_quantities,
+)
 from ffr_dyn.analyses.registry import OverTime, option
 from ffr_dyn.analyses.settings import Settings
 from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.consistency.assemble import Assembled, assemble, flattened
 from ffr_dyn.consistency.doubts import checked
 from ffr_dyn.consistency.evaluation import joined, record_states
+from ffr_dyn.consistency.step_error import Beside
 from ffr_dyn.integrators import Integrator, Within
 from ffr_dyn.integrators.stabilisation import Projection
 from ffr_dyn.kernels.tables import EVALUATIONS, Record
@@ -44,6 +55,11 @@ from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError, InputError
 
 SHORTEST = 1e-8  # step of the internal dynamics, of the time between two rows: shorter ones go nowhere
+HALF, SURE = (
+    0.5,
+    2,
+)  # of the step, which tells the error of a bounded solution; order 4 to 1 as the known motion is smooth
+FINER, ORDER = 10.0, 8  # tolerances that tell the error of a causal one, and the order of its method
 AT_ONCE = 2  # derivatives of known motions after which efforts that act on them directly appear
 
 
@@ -193,17 +209,20 @@ def _named(
     path: str | Path | None,
 ) -> Result:
     """The drivers' efforts under the names of the unknown forces."""
-    found = efforts(scene, result)
+    found, same = efforts(scene, result), dict[str, str]()
     for force, (driver, sign) in partners.items():
+        same[f"{force}.power"] = f"{driver}.power"
         row = next(d for d in scene.drivers if d.name == driver)
         if isinstance(row, PointDriver):
             axis = next(k for k, c in enumerate("xyz") if getattr(row, c) is not None)
+            same[f"{force}.effort"] = f"{driver}.force"
             effort = Quantity(sign * result[f"{driver}.force"][:, axis], "N", (), f"force that realises {driver}")
         else:
+            same[f"{force}.effort"] = f"{driver}.effort"
             effort = replace(found[f"{driver}.effort"], description=f"effort that realises {driver}")
         found[f"{force}.effort"] = effort
         found[f"{force}.power"] = result.quantity(f"{driver}.power")
-    attributes = {**result.attributes, "analysis": "mixed dynamics, collocated"}
+    attributes = {**efforts_told(scene, result, same), "analysis": "mixed dynamics, collocated"}
     return with_quantities(only(replace(result, attributes=attributes), scene, outputs), found, path)
 
 
@@ -227,14 +246,18 @@ def _not_collocated(
     own = servo(assembled, names, whole.own.unknown, (start, end)) if degree == AT_ONCE else whole.own
     w = internal_values(own, assembled.x, assembled.v)
     chosen = _solution(own, degree, w, assembled.x, solution)
+    other: Found | None
     if isinstance(chosen, Bounded):
         y = internal_values(whole.own, assembled.x, assembled.v)[: whole.size]
-        times, us, states, notes = bounded_solution(whole, chosen, output_step, y, assembled.x, progress)
+        times, found, other, notes = bounded_solution(whole, chosen, output_step, y, assembled.x, progress)
+        differ = HALF, SURE
     else:
         times, notes = output_times(start, end, output_step), []
-        us, states = _integrated(own, chosen, times, w, assembled.x, progress)
-    record = _recorded(whole, times, us, states)
-    system = whole.free.system
+        found = _integrated(own, chosen, times, w, assembled.x, progress)
+        finer = replace(chosen, tolerance=chosen.tolerance / FINER)
+        other = _integrated(own, finer, times, w, assembled.x, None) if own.size else None
+        differ = FINER ** (-1 / ORDER), ORDER
+    record, system = _recorded(whole, times, found), whole.free.system
     doubted = checked("mixed", replace(assembled, system=system, all_rows=None), record)
     attributes: dict[str, Any] = {
         **described(scene),
@@ -243,11 +266,20 @@ def _not_collocated(
         "evaluations": int(own.at.work.info[EVALUATIONS] + whole.free.work.info[EVALUATIONS]),
         "degrees_of_freedom": own.size,
         "internal_coordinates": list(own.names),
-        "notes": [*assembled.notes, *notes, *doubted],
+        "notes": [*assembled.notes, *notes, *doubted, *not_counted(own.angles, record)],
         "status": "complete",
     }
-    found = _efforts_found(system, record, whole.own.unknown, us)
-    return with_quantities(result_of(system, record, attributes, outputs=outputs), found, path)
+    result = _measured(whole, record, found, attributes, outputs)
+    if other is not None:
+        finer_result = _measured(whole, _recorded(whole, times, other), other, attributes, outputs)
+        result = with_errors(result, Beside(finer_result, differ[0]), differ[1])
+    return with_quantities(result, {}, path)
+
+
+def _measured(of: Plant, record: Record, found: Found, attributes: dict[str, Any], outputs: Sequence[str]) -> Result:
+    """The outputs of states, with the efforts found."""
+    efforts_found = _efforts_found(of.free.system, record, of.own.unknown, found.u)
+    return with_quantities(result_of(of.free.system, record, attributes, outputs=outputs), efforts_found)
 
 
 def _fitted(
@@ -294,8 +326,8 @@ def _solution(own: ServoMotion, degree: int, w: Array, x: Array, wanted: Causal 
 
 def _integrated(
     own: ServoMotion, causal: Causal, times: Array, w: Array, x: Array, progress: Callable[[float], None] | None
-) -> tuple[Array, list[tuple[Array, Array]]]:
-    """Efforts (T, U) and states (x, v) at the output times."""
+) -> Found:
+    """Efforts and states at the output times."""
     from scipy.integrate import DOP853
 
     moments = [at_moment(own, float(times[0]), w, x)]
@@ -319,14 +351,16 @@ def _integrated(
         moments.append(at_moment(own, float(time), w, moments[-1].x))
         if progress is not None:
             progress(float(time))
-    return np.array([moment.u for moment in moments]), [(moment.x, moment.v) for moment in moments]
+    states, measured = [(moment.x, moment.v) for moment in moments], [moment.measured for moment in moments]
+    return Found(np.array([moment.u for moment in moments]), states, measured)
 
 
-def _recorded(of: Plant, times: Array, us: Array, states: list[tuple[Array, Array]]) -> Record:
-    """The states (x, v), with the efforts us (T, U)."""
+def _recorded(of: Plant, times: Array, found: Found) -> Record:
+    """The states, with the efforts."""
     rows = []
-    for time, u, (x, v) in zip(times, us, states, strict=True):
+    for time, u, (x, v), measured in zip(times, found.u, found.states, found.measured, strict=True):
         here = sized(of.free, of.own.unknown, u)
+        here.work.loads.reference[:] = measured
         row = record_states(here, np.clip([time], *of.own.span), x[None], v[None])
         rows.append(row._replace(time=np.array([time])))
     return joined(rows)

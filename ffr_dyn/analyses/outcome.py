@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,7 @@ import numpy as np
 
 from ffr_dyn.analyses.integration import geometry
 from ffr_dyn.compile.scene_tables import System
+from ffr_dyn.consistency.step_error import Beside, step_errors, worst
 from ffr_dyn.functions.rotation import rotation_matrix
 from ffr_dyn.kernels.tables import Record
 from ffr_dyn.results.file import save_result
@@ -38,14 +40,29 @@ def result_of(
     attributes: dict[str, Any],
     path: str | Path | None = None,
     outputs: Sequence[str] = ("default",),
+    near: Mapping[str, Array] | None = None,
 ) -> Result:
     """Quantities of recorded states, efforts of the drivers included; written to `path` when it is complete.
 
     outputs : names or patterns; beside them every result has the quantities of `accompanying` and the efforts
+    near    : joint angles (T,), within half a turn, where more is known of their turns than rows tell (`turned_along`)
     """
     quantities, _ = measure(View(system, record), {}, selected(system, needed(system.scene, outputs)))
+    for name, angles in (near or {}).items():
+        if name in quantities:
+            found = quantities[name].values
+            turns = 2 * np.pi * np.round((angles - found) / (2 * np.pi))
+            quantities[name] = replace(quantities[name], values=found + turns)
     plain = Result(record.time, quantities, geometry(system.scene), attributes)
     return with_quantities(only(plain, system.scene, outputs), efforts(system.scene, plain), path)
+
+
+def turned_along(system: System, way: Record, rows: Sequence[int]) -> dict[str, Array]:
+    """Joint angles (rows,) by name, which count their turns from state to state on a way, of which some are rows."""
+    entries = selected(system, ("default",))
+    named = {f"{joint.name}.angle" for joint in system.scene.joints}
+    angles, _ = measure(View(system, way), {}, {name: entry for name, entry in entries.items() if name in named})
+    return {name: quantity.values[list(rows)] for name, quantity in angles.items()}
 
 
 def accompanying(scene: Scene) -> tuple[str, ...]:
@@ -76,6 +93,13 @@ def with_quantities(result: Result, more: dict[str, Quantity], path: str | Path 
     return whole
 
 
+def with_errors(result: Result, other: Beside, order: float) -> Result:
+    """The result with the errors of its outputs, by another with other steps and the order that is sure of them."""
+    errors = step_errors(result, other, order)
+    told = {name: [error.error, error.of_range] for name, error in errors.items()}
+    return replace(result, attributes={**result.attributes, "errors": told, "accuracy": worst(errors)})
+
+
 def efforts(scene: Scene, result: Result) -> dict[str, Quantity]:
     """ "driver.effort" [N m or N] of every driven joint coordinate: what acts along it on the second body.
 
@@ -91,6 +115,19 @@ def efforts(scene: Scene, result: Result) -> dict[str, Quantity]:
             text = f"effort along {driver.joint}.{driver.coordinate}, on the second body"
             found[f"{driver.name}.effort"] = Quantity(effort, "N m" if angular else "N", (), text)
     return found
+
+
+def efforts_told(scene: Scene, result: Result, more: Mapping[str, str]) -> dict[str, Any]:
+    """The attributes of a result of which efforts have the errors of what they are: of the force or moment of their driver.
+
+    more : other quantities, and those that they are
+    """
+    coordinates = {driver.name: driver.coordinate for driver in scene.drivers if isinstance(driver, Driver)}
+    kinds = {"angle": "moment", "stroke": "force"}
+    same = {**{f"{name}.effort": f"{name}.{kinds[coordinate]}" for name, coordinate in coordinates.items()}, **more}
+    known = result.attributes.get("errors", {})
+    told = {name: known[same.get(of, of)] for name, of in same.items() if same.get(of, of) in known}
+    return {**result.attributes, "errors": {**known, **told}}
 
 
 def _axis_history(result: Result, marker: str, axis: Array) -> Array:

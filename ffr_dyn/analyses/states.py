@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
 from ffr_dyn.functions.time_functions import as_time_function, constant, evaluate
 from ffr_dyn.results.result import Result
 from ffr_dyn.scene.drivers import Driver, PointDriver
@@ -13,11 +15,19 @@ from ffr_dyn.scene.scene import Body, Scene, require_scene
 
 
 def scene_at(scene: Scene, result: Result, row: int = -1) -> Scene:
-    """The scene with its bodies where a row of a result has them, moving as they do there.
+    """The scene with its bodies where a row of a result has them, moving as they do there; forces on angles have the whole
+    turns that they have counted, where the result keeps them ("spring.angle").
 
     >>> later = fd.scene_at(scene, result)  # as it is at the end
     """
-    return replace(scene, bodies=tuple(_body_at(body, result, row) for body in scene.bodies))
+    bodies = tuple(_body_at(body, result, row) for body in scene.bodies)
+    return replace(scene, bodies=bodies, forces=tuple(_force_at(force, result, row) for force in scene.forces))
+
+
+def _force_at(force: Any, result: Result, row: int) -> Any:
+    angle = f"{force.name}.angle"
+    counts = getattr(force, "turns", None) is not None and force.place.way == "angle" and angle in result
+    return replace(force, turns=round(float(result[angle][row]) / (2 * np.pi))) if counts else force
 
 
 def _body_at(body: Body, result: Result, row: int) -> Body:

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ffr_dyn.analyses.integration import with_all_reactions
-from ffr_dyn.analyses.outcome import result_of
+from ffr_dyn.analyses.outcome import result_of, turned_along
 from ffr_dyn.analyses.registry import OfMoment
 from ffr_dyn.analyses.settings import MomentSettings
 from ffr_dyn.analyses.states import held
@@ -23,9 +23,11 @@ from ffr_dyn.consistency.doubts import checked
 from ffr_dyn.consistency.equilibrium import Equilibrium, equilibrium, jumped
 from ffr_dyn.consistency.evaluation import (
     Evaluator,
+    copied,
     evaluate,
     evaluator,
     free_motions,
+    joined,
     record_states,
     total_mass_matrix,
 )
@@ -109,22 +111,20 @@ def _lowest_stiffness(at: Evaluator, assembled: Assembled, found: Equilibrium) -
         )
     applied = np.linalg.solve(M, found.balance.forces) / sizes(at)
     limit = NEUTRAL * np.abs(applied).max() + ROUNDING * np.abs(values).max()
+    if not (symmetric := bool(np.abs(K - K.T).max() <= SYMMETRIC * np.abs(K).max())):
+        values, vectors = np.linalg.eig(K)  # the symmetric part says nothing then, of what holds and of stability
     loose = int(np.argmin(np.abs(values)))
     if abs(values[loose]) <= limit:
-        raise _not_held(assembled, x, Z @ vectors[:, loose], "the equilibrium is not determined")
-    return _eigenvalues(K, float(values[0]))
+        raise _not_held(assembled, x, Z @ vectors[:, loose].real, "the equilibrium is not determined")
+    return (float(values[0]), 0.0) if symmetric else _with_flutter(values)
 
 
-def _eigenvalues(K: Array, lowest: float) -> tuple[float, float]:
-    """The lowest eigenvalue, and the frequency [Hz] at which it flutters, or zero; `lowest` is that of the symmetric part.
+def _with_flutter(values: Array) -> tuple[float, float]:
+    """The lowest eigenvalue of a stiffness matrix, and the frequency [Hz] at which it flutters, or zero.
 
-    Forces without a potential leave K unsymmetric, and its symmetric part says nothing of stability then; where two
-    eigenvalues have met and are complex, a vibration grows.
+    Forces without a potential leave the matrix unsymmetric; a vibration grows where two eigenvalues have met and are complex.
     """
-    largest = np.abs(K).max()
-    if np.abs(K - K.T).max() <= SYMMETRIC * largest:
-        return lowest, 0.0
-    values = np.linalg.eigvals(K)
+    largest = np.abs(values).max()
     met = values[np.abs(values.imag) > MET * np.abs(values) + SYMMETRIC * largest].astype(complex)
     frequencies = np.abs(np.sqrt(-met).imag) / (2 * np.pi)
     return float(values.real.min()), float(frequencies.min()) if met.size else 0.0
@@ -150,8 +150,12 @@ def _result(
     path: str | Path | None,
 ) -> Result:
     still = np.zeros(assembled.system.layout.v_size)
-    for x in found.path[:-1]:  # forces count the turns of angles on the way
+    way = []
+    for x in found.path[:-1]:  # angles count their turns on it, those of forces and of joints
         evaluate(at, time, x, still)
+        way.append(copied(at.record))
+    evaluate(at, time, found.path[-1], still)
+    near = turned_along(at.system, joined([*way, copied(at.record)]), [-1])
     record = with_all_reactions(assembled, record_states(at, np.array([time]), found.path[-1:], still[None]))
     lowest, flutter, branch = seen
     stable = lowest > 0 and not flutter
@@ -173,4 +177,4 @@ def _result(
         "status": "complete",
     }
     attributes = {key: value for key, value in attributes.items() if value is not None}
-    return result_of(assembled.system, record, attributes, path, outputs)
+    return result_of(assembled.system, record, attributes, path, outputs, near)

@@ -33,7 +33,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, partial
 from typing import Any
 
@@ -79,6 +79,7 @@ NEVER = (
 FIRST_ROWS = 2  # in which what a twin shows may be larger than ever after
 BEYOND = 0.25  # of a row, up to where steps are looked at after the first
 SEEN = 1e-6  # of the range, below which it is not looked for
+ENDED_BY = "ended_by"  # attribute: the event that has ended a run, whose last row is of that moment then
 FULL, FEW = 0.3, 2  # of the largest, up to where a growth is even; rows in each third of its decades
 
 
@@ -110,6 +111,21 @@ class _Columns:
     def largest(self, values: Array) -> Array:
         """(O,) the largest of values (K,) of each output."""
         return np.maximum.reduceat(values, self.first)
+
+
+def on_shared_rows(runs: Sequence[Result]) -> list[Result]:
+    """The rows that runs share of which an event may have ended some: the last of each where it has ended all."""
+    ended = [ENDED_BY in run.attributes for run in runs]
+    if not any(ended):
+        return list(runs)
+    count = min(run.time.size - last for run, last in zip(runs, ended, strict=True))
+    return [_rows(run, [*range(count), *([-1] if all(ended) else [])]) for run in runs]
+
+
+def _rows(run: Result, rows: Sequence[int]) -> Result:
+    chosen = np.array(rows, int)
+    quantities = {name: replace(run.quantity(name), values=run[name][chosen]) for name in run.quantities}
+    return Result(run.time[chosen], quantities, run.geometry, run.attributes)
 
 
 def _columns(run: Result, names: Iterable[str]) -> _Columns:

@@ -13,9 +13,10 @@ Numerov's scheme, of order four, all times at once,
 
 answers motions faster than the step by their statics. Newton's method with derivatives from a few places along the path, more
 of them where that converges slowly. What the scheme has beside the internal dynamics, oscillations near the ends that a step
-divides by ten, is kept smallest in the third differences of u. (Devasia, Chen & Paden, IEEE Transactions on Automatic Control
-41 (1996) 930-942; Brüls, Bastos & Seifried, Multibody System Dynamics 31 (2014) 189-211; Hairer, Nørsett & Wanner 1993,
-sec. III.10.)
+divides by ten, is kept smallest in the third differences of u. The same with half the step, begun from the solution, tells
+the error, which is of order four where the known motion is smooth, and down to one in u where derivatives of it jump.
+(Devasia, Chen & Paden, IEEE Transactions on Automatic Control 41 (1996) 930-942; Brüls, Bastos & Seifried, Multibody System
+Dynamics 31 (2014) 189-211; Hairer, Nørsett & Wanner 1993, sec. III.10.)
 """
 
 from __future__ import annotations
@@ -26,6 +27,7 @@ from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
+from scipy.interpolate import CubicSpline
 from scipy.linalg import schur
 from scipy.sparse.linalg import splu
 
@@ -45,6 +47,7 @@ REST = 1e-6  # of a speed or an acceleration
 SLOW = 0.3  # contraction, beyond which the derivatives along the path are renewed
 PLACES = 17  # along the path, at which derivatives are found first
 LONGEST = 2.0  # of the added times over the known motion's, by default
+ENOUGH = 1e-3  # of the first correction: what half the step changes is known then
 FAINT = 1e-4  # weight of what only the scheme needs at the ends, beside what the internal dynamics do
 _ROUGH = 3  # times at either end at which the third differences of u are kept small
 Told = Callable[[float], None] | None
@@ -93,10 +96,21 @@ class _End:
     decay: float
 
 
+@dataclass(frozen=True)
+class Found:
+    """What holds at output times: u (T, U), states (x, v), what forces have measured at each, with its turns."""
+
+    u: Array
+    states: list[tuple[Array, Array]]
+    measured: list[Array]
+
+
 def bounded_solution(
     of: Plant, settings: Bounded, output_step: float, y: Array, x: Array, progress: Told = None
-) -> tuple[Array, Array, list[tuple[Array, Array]], list[str]]:
-    """Times (T,), u (T, U), states (x, v), and notes. y, x : near the equilibrium before the known motion.
+) -> tuple[Array, Found, Found | None, list[str]]:
+    """Times (T,), what is found, the same with half the step unless that does not converge, and notes.
+
+    y, x : near the equilibrium before the known motion
 
     Raises InputError when the known motion does not start and end at rest; ComputationError when nothing converges.
     """
@@ -116,17 +130,27 @@ def bounded_solution(
     rows = round(span / output_step) * settings.parts
     h = output_step / settings.parts
     times = of.own.span[0] + h * np.arange(-before * settings.parts, rows + after * settings.parts + 1)
-    path = _collocated(of, times, places, progress)
-    keep = slice(None, None, settings.parts)
-    rates = _velocities(path.y, path.a, h)
+    path = _collocated(of, times, places, progress, _resting(of, times, places))
+    notes = [
+        f"bounded solution over {times[0]:.4g} to {times[-1]:.4g} s with {len(first.growing)} growing internal motions"
+    ]
+    finer = _halved(of, times, path, places, settings.parts)
+    if finer is None:
+        notes.append(
+            "the error of the bounded solution is not known: with half the step it did not converge; use a smaller output "
+            "step"
+        )
+    return times[:: settings.parts], _found(of, times, path, settings.parts), finer, notes
+
+
+def _found(of: Plant, times: Array, path: Path, parts: int) -> Found:
+    """What holds at every so many times of a path."""
+    keep, rates = slice(None, None, parts), _velocities(path.y, path.a, float(times[1] - times[0]))
     looks = [
         look(of, float(t), *w)
         for t, *w in zip(times[keep], path.y[keep], rates[keep], path.u[keep], path.near[keep], strict=True)
     ]
-    note = (
-        f"bounded solution over {times[0]:.4g} to {times[-1]:.4g} s with {len(first.growing)} growing internal motions"
-    )
-    return times[keep], path.u[keep], [(now.x, now.v) for now in looks], [note]
+    return Found(path.u[keep], [(now.x, now.v) for now in looks], [now.measured for now in looks])
 
 
 def _whole(span: float, output_step: float) -> int:
@@ -211,15 +235,31 @@ def _require_rest(of: Plant, *ends: _End) -> None:
 # ---- all times at once -----------------------------------------------------------------------------------------------
 
 
-def _collocated(of: Plant, times: Array, places: list[_End], progress: Told) -> Path:
-    """Newton's method from the equilibria along the known motion."""
-    h, inside = float(times[1] - times[0]), np.linspace(*of.own.span, len(places))
+def _resting(of: Plant, times: Array, places: list[_End]) -> Path:
+    """The equilibria along the known motion."""
+    inside = np.linspace(*of.own.span, len(places))
     y = np.array([np.interp(times, inside, row) for row in np.array([end.y for end in places]).T]).T
     u = np.array([np.interp(times, inside, row) for row in np.array([end.u for end in places]).T]).T
     nearest = np.abs(times[:, None] - inside).argmin(axis=1)
-    path = Path(y, np.zeros_like(y), u.reshape(times.size, -1), [places[k].x for k in nearest])
+    return Path(y, np.zeros_like(y), u.reshape(times.size, -1), [places[k].x for k in nearest])
+
+
+def _halved(of: Plant, times: Array, path: Path, places: list[_End], parts: int) -> Found | None:
+    """What is found with half the step, begun from a path at times; None where it does not converge."""
+    fine = np.linspace(times[0], times[-1], 2 * times.size - 1)
+    y, a, u = (CubicSpline(times, values)(fine) for values in (path.y, 0.25 * path.a, path.u))
+    begun = Path(y, a, u, [path.near[k // 2] for k in range(fine.size)])
+    try:
+        return _found(of, fine, _collocated(of, fine, places, None, begun, ENOUGH), 2 * parts)
+    except ComputationError:
+        return None
+
+
+def _collocated(of: Plant, times: Array, places: list[_End], progress: Told, path: Path, enough: float = 0.0) -> Path:
+    """Newton's method from a path, until a correction is small, or that part of the first that is `enough`."""
+    h, inside = float(times[1] - times[0]), np.linspace(*of.own.span, len(places))
     at = _between(inside, [end.slopes for end in places], times)
-    count, size, before, done = PLACES, 0.0, np.inf, 0.0
+    count, size, before, done, first = PLACES, 0.0, np.inf, 0.0, 0.0
     solve = _linear(at, places[0], places[-1], h)
     for _ in range(ITERATIONS):
         try:
@@ -233,7 +273,8 @@ def _collocated(of: Plant, times: Array, places: list[_End], progress: Told) -> 
             done = max(done, _done(size, TOLERANCE))
             progress(float(times[0] + (times[-1] - times[0]) * done))
         scale = max(float(np.abs(path.y).max()), 1e-6)
-        if size < TOLERANCE * scale or ROUNDING * scale > size > SLOW * before:
+        first = first or size
+        if size < max(TOLERANCE * scale, enough * first) or ROUNDING * scale > size > SLOW * before:
             return path
         if size > SLOW * before and count < times.size:
             count = min(2 * count, times.size)

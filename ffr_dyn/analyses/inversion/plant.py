@@ -15,6 +15,7 @@ import numpy as np
 
 from ffr_dyn.analyses.efforts import Effort, effort_slots
 from ffr_dyn.analyses.inversion.servo import ServoMotion, guided, left_free, placed, square, unguided
+from ffr_dyn.analyses.inversion.turns import count_turns
 from ffr_dyn.compile.engine import with_model
 from ffr_dyn.compile.scene_tables import compile_scene
 from ffr_dyn.consistency.assemble import Assembled
@@ -47,12 +48,13 @@ class Plant:
 
 @dataclass(frozen=True)
 class Look:
-    """The plant at one time: state x, v, accelerations y_ddot (D,), outputs s (U,)."""
+    """The plant at one time: state x, v, accelerations y_ddot (D,), outputs s (U,), what forces have measured (O,)."""
 
     x: Array
     v: Array
     y_ddot: Array
     s: Array
+    measured: Array
 
 
 @dataclass(frozen=True)
@@ -108,9 +110,11 @@ def look(of: Plant, time: float, y: Array, rate: Array, u: Array, near: Array) -
     v = to_global_axes(at.system.layout, x, V)
     now = evaluate(at, clock, x, v)
     of.free.system.model.loads.data[of.slots] = of.shares @ u
+    count_turns(own.angles, of.free, clock, y)
     acceleration = evaluate(of.free, clock, x, v).acceleration
     joints = now.jacobian[own.inner] @ acceleration - now.gamma[own.inner]
-    return Look(x, v, np.concatenate([joints, acceleration[own.elastic]]), now.Phi[own.known])
+    y_ddot, measured = np.concatenate([joints, acceleration[own.elastic]]), of.free.work.loads.measured.copy()
+    return Look(x, v, y_ddot, now.Phi[own.known], measured)
 
 
 def slopes(of: Plant, time: float, y: Array, rate: Array, u: Array, near: Array) -> Slopes:

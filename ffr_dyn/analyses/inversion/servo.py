@@ -17,6 +17,7 @@ import numpy as np
 from scipy.linalg import qr
 
 from ffr_dyn.analyses.efforts import Effort, sized
+from ffr_dyn.analyses.inversion.turns import Angle, angles_of, count_turns
 from ffr_dyn.compile.engine import with_model
 from ffr_dyn.compile.scene_tables import compile_scene
 from ffr_dyn.consistency.assemble import Assembled
@@ -58,6 +59,7 @@ class ServoMotion:
     elastic  : numbers in v of elastic coordinates of y, which come after the joint coordinates
     data     : where the functions of the joint coordinates keep their two numbers
     span     : known motions are held at their values outside of it [s]
+    angles   : on which forces act
     """
 
     at: Evaluator
@@ -70,6 +72,7 @@ class ServoMotion:
     data: Array
     span: tuple[float, float]
     names: tuple[str, ...]
+    angles: tuple[Angle, ...] = ()
 
     @property
     def size(self) -> int:
@@ -79,12 +82,13 @@ class ServoMotion:
 
 @dataclass(frozen=True)
 class Moment:
-    """The scene at one time: x, v (global), efforts u, y_ddot."""
+    """The scene at one time: x, v (global), efforts u, y_ddot, and what forces have measured (O,), with its turns."""
 
     x: Array
     v: Array
     u: Array
     y_ddot: Array
+    measured: Array
 
 
 def servo(
@@ -131,7 +135,10 @@ def _in_coordinates(
     plant_rows = np.setdiff1d(every, np.concatenate([inner_rows, known_rows]))
     data = system.model.functions.start[rows.function[inner_rows]]
     at = _owning(sized(evaluator(system), unknown, np.zeros(len(unknown))))
-    return ServoMotion(at, unknown, plant_rows, known_rows, inner_rows, held, np.array(elastic, int), data, span, names)
+    own = ServoMotion(at, unknown, plant_rows, known_rows, inner_rows, held, np.array(elastic, int), data, span, names)
+    y = internal_values(own, assembled.x, assembled.v)
+    evaluate(at, span[0], assembled.x, assembled.v)
+    return replace(own, angles=angles_of(at, names[: own.inner.size], span[0], y))
 
 
 def _owning(at: Evaluator) -> Evaluator:
@@ -241,6 +248,7 @@ def at_moment(own: ServoMotion, time: float, w: Array, near: Array) -> Moment:
     x, now = placed(own, at, clock, w, near)
     V = np.linalg.solve(square(own, now), np.concatenate([-now.nu[own.held], w[own.size + own.inner.size :]]))
     v = to_global_axes(own.at.system.layout, x, V)
+    count_turns(own.angles, at, clock, w)
     now = evaluate(at, clock, x, v)
     return _accelerated(own, at, now, (clock, x, v), now.gamma)
 
@@ -286,7 +294,7 @@ def _accelerated(
     acceleration = found[:V]
     joints = now.jacobian[own.inner] @ acceleration - gamma[own.inner]
     y_ddot = np.concatenate([joints, acceleration[own.elastic]])
-    return Moment(state[1], state[2], found[V + C :], y_ddot)
+    return Moment(state[1], state[2], found[V + C :], y_ddot, at.work.loads.measured.copy())
 
 
 def _check_determined(matrix: Array, time: float) -> None:

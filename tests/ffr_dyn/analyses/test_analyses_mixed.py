@@ -7,12 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from planar_beam import planar_beam
+from scipy.integrate import solve_bvp
 from test_analyses_kinematic import bar
 
 import ffr_prep as fp
 from ffr_dyn.analyses.efforts import JointEffort, MarkerEffort, recorded, with_effort, with_units
 from ffr_dyn.analyses.integration import integrate
-from ffr_dyn.analyses.inverse import QuasiStatic, inverse
+from ffr_dyn.analyses.inverse import Dynamic, QuasiStatic, inverse
 from ffr_dyn.analyses.inversion.bounded import Bounded
 from ffr_dyn.analyses.inversion.servo import at_moment, internal_values, servo
 from ffr_dyn.analyses.kinematic import kinematic
@@ -253,6 +254,17 @@ def test_an_arm_that_bends_too_far_is_told():
     assert any("body 'arm' deforms" in note for note in notes), notes
 
 
+@pytest.mark.parametrize("run", [mixed, inverse], ids=["mixed", "inverse"])
+def test_efforts_have_the_error_of_the_moment_that_they_are(run):
+    scene = one_link(Driver("turn", "bearing", rest_to_rest(1.0, 0.6)))
+    how = {"elastic": Dynamic(RK4(5e-4))} if run is inverse else {"unknown": (MOTOR,), "method": RK4(5e-4)}
+    errors = run(scene, end=0.2, output_step=0.01, **how).attributes["errors"]
+    assert errors["turn.effort"] == errors["turn.moment"]
+    if run is mixed:
+        assert errors["motor.effort"] == errors["turn.moment"]
+        assert errors["motor.power"] == errors["turn.power"]
+
+
 def test_causal_inversion_of_the_tip_path_is_refused():
     with pytest.raises(ComputationError, match="internal dynamics are unstable"):
         mixed(one_link(TIP), unknown=(MOTOR,), end=0.6, output_step=0.01, solution=Causal())
@@ -370,6 +382,22 @@ def test_two_masses_on_a_spring():
     assert coarse / fine > 10
 
 
+@pytest.mark.parametrize("ends", [STEP, np.array([0, 0, 0, 0, 35, -84, 70, -20.0])], ids=["smooth", "force jumps"])
+def test_forces_by_way_of_a_spring_tell_their_error(ends):
+    """0.3 to 5 times the true one; no less where the force jumps with a derivative of the known motion."""
+    coefficients = 0.5 * ends / 0.6 ** np.arange(ends.size)
+    path, given = np.polynomial.Polynomial(coefficients), coefficients + np.eye(ends.size)[0]
+    go = Driver("go", "rail2", piecewise([0.0, 0.6], given[None]), coordinate="stroke")
+    found = mixed(spring_carts(go), unknown=(JointEffort("push", "rail1", "stroke"),), end=0.6, output_step=0.01)
+    during = (found.time > 1e-9) & (found.time < 0.6 - 1e-9)
+    expected = np.where(during, path.deriv(4)(found.time) / 400 + 2 * path.deriv(2)(found.time), 0.0)
+    known = during | (ends.size == STEP.size)  # at a jump of the force the one side of it is as right as the other
+    off = np.abs(found["push.effort"] - expected)[known].max()
+    told = found.attributes["errors"]["push.effort"][0]
+    assert told / off >= 0.3
+    assert told <= 5.0 * off or ends.size < STEP.size
+
+
 def test_a_force_by_way_of_a_spring_is_not_integrated():
     scene = spring_carts(Driver("go", "rail2", polynomial(1.0), coordinate="stroke"))
     push = JointEffort("push", "rail1", "stroke")
@@ -478,6 +506,46 @@ def test_an_inverted_rod_is_carried_by_leaning_first():
     found = bounded(cart_with_rod(0.1, np.pi / 2, gravity=(0, -9.81, 0)), 0.02)
     assert found["hinge.angle"][found.time < -0.01][-1] < np.pi / 2 - 1e-3
     assert abs(found["hinge.angle"][-1] - np.pi / 2) < 0.05
+
+
+def true_cart_with_rod(height: float, times: np.ndarray) -> np.ndarray:
+    """(T, 2) angle from the upright, (to the left) and force on the cart: another solver of its equation; it must neither
+    fall nor swing at both ends."""
+    path = np.polynomial.Polynomial(height * np.array([0, 0, 0, 0, 35, -84, 70, -20]) / 0.3 ** np.arange(8.0))
+
+    def pushed(t):
+        return np.where((t >= 0) & (t <= 0.3), path.deriv(2)(t), 0.0)
+
+    def rates(t, y):
+        return np.stack([y[1], (0.5 * 9.81 * np.sin(y[0]) + 0.5 * pushed(t) * np.cos(y[0])) / (1 / 12 + 0.25)])
+
+    grows = np.sqrt(0.5 * 9.81 / (1 / 12 + 0.25))
+    grid = np.unique(
+        np.concatenate([np.linspace(-0.5, 0.0, 200), np.linspace(0.0, 0.3, 400), np.linspace(0.3, 0.8, 200)])
+    )
+    found = solve_bvp(
+        rates, lambda a, b: np.array([grows * a[0] - a[1], grows * b[0] + b[1]]), grid, np.zeros((2, grid.size)),
+        tol=1e-9, max_nodes=10**5,
+    )  # fmt: skip
+    angle, rate = found.sol(times)
+    turn = rates(times, np.stack([angle, rate]))[1]
+    force = 2.0 * pushed(times) - 0.5 * (turn * np.cos(angle) - rate**2 * np.sin(angle))
+    return np.stack([angle, force], axis=1)
+
+
+@pytest.mark.parametrize("output_step", [0.05, 0.02])
+def test_bounded_solutions_tell_their_error(output_step):
+    """0.3 to 5 times the true one: an inverted rod, by another solver."""
+    found = bounded(cart_with_rod(0.1, np.pi / 2, gravity=(0, -9.81, 0)), output_step)
+    angle, force = true_cart_with_rod(0.1, found.time).T
+    off = {
+        "hinge.angle": np.abs(found["hinge.angle"] - np.pi / 2 - angle).max(),
+        "push.effort": np.abs(found["push.effort"] - force).max(),
+    }
+    for name, true in off.items():
+        assert 0.3 <= found.attributes["errors"][name][0] / true <= 5.0, name
+    assert found.attributes["accuracy"].startswith("step: within ")
+    assert set(found.quantities) - set(found.attributes["errors"]) <= {"constraint.position", "constraint.velocity"}
 
 
 @pytest.mark.parametrize("moment", [4.0, -4.0])
