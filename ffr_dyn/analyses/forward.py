@@ -51,6 +51,7 @@ from ffr_dyn.integrators.tolerances import tightened
 from ffr_dyn.linear.steady_state import steadily
 from ffr_dyn.results.file import load_result, with_attributes
 from ffr_dyn.results.result import Result
+from ffr_dyn.scene.checks import several
 from ffr_dyn.scene.scene import Scene
 from ffr_prep.common.errors import ComputationError, InputError
 
@@ -145,7 +146,8 @@ class _Runs:
         They go on at the same time, and progress is their mean; one after another beside a stopwatch, and with the user's
         Python functions, which would be called out of order.
         """
-        lonely = self.how["stopwatch"] is not None or self.assembled.system.user.count
+        python = self.assembled.system.user.count or any(callable(event.quantity) for event in self.how["events"])
+        lonely = self.how["stopwatch"] is not None or python
         progress, found, times = self.how["progress"], dict[int, Any](), [self.start] * len(calls)
 
         def heard(number: int, time: float) -> None:
@@ -205,6 +207,7 @@ def forward(
     assembled = begun(assemble(scene, time=start) if assembled is None else assembled, start, begin, method)
     common: dict[str, Any] = {"start": start, "end": end, "output_step": output_step, "stabilisation": stabilisation}
     common |= {"outputs": outputs, "progress": progress, "stopwatch": stopwatch}
+    common["events"] = tuple(event for event in several("events", events, (Event,)) if event.stop)  # runs end alike
     wanted = Within() if method is None else method
     if isinstance(wanted, Within) or stabilisation == Projection():
         common["stabilisation"] = _tight(stabilisation, getattr(wanted, "accuracy", Within().accuracy))
