@@ -52,6 +52,7 @@ from ffr_dyn.linear.steady_state import steadily
 from ffr_dyn.results.file import load_result, with_attributes
 from ffr_dyn.results.result import Result
 from ffr_dyn.scene.checks import several
+from ffr_dyn.scene.force_kinds import forces_of
 from ffr_dyn.scene.scene import Scene
 from ffr_prep.common.errors import ComputationError, InputError
 
@@ -133,6 +134,13 @@ class _Runs:
         """When [s] functions of time break without steps that end there, by what they are for."""
         count = round((self.how["end"] - self.start) / self.output_step)
         return untold_breaks(self.assembled.system, np.linspace(self.start, self.how["end"], count + 1))
+
+    @cached_property
+    def sudden(self) -> bool:
+        """Whether forces may change within a step, however short: only beside about twice the step has a run an order then."""
+        system = self.assembled.system
+        moved = any(callback.with_state for callback in system.user.callbacks)
+        return bool(self.untold) or moved or any(force.sudden for force in forces_of(system.scene))
 
     def run(self, method: Integrator, **more: Any) -> Result:
         """One run."""
@@ -329,7 +337,7 @@ def _further(
 ) -> list[Callable[[Say], Beside | None]]:
     """The further runs that tell the error of a run beside its twin: one with another step, and, beside a twin of half the
     step, one with a longer step; those of the last trial if its step is not too far."""
-    far = 2 if runs.untold else _leap(method)
+    far = 2 if runs.sudden else _leap(method)
     near = next((one for one in reversed(earlier) if one.twins and count <= far * one.count), None)
     if near is not None:
         ratio = count / near.count
@@ -340,14 +348,14 @@ def _further(
 
 
 def _other(runs: _Runs, method: Any, count: int, say: Say) -> Beside:
-    """The run with another step: about twice the step, or four times of a method of higher order unless a break lies within
+    """The run with another step: about twice the step, or four times of a method of higher order unless forces change within
     steps, where elastic forces are implicit and that is part of a row, else half of it; with a tenth of the tolerances of a
     method that chooses its steps, and work added up twice as often."""
     if method.controlled:
         finer = replace(method, tolerances=tightened(method.tolerances, 10))
         return Beside(runs.run(finer, progress=say, looks=2 * LOOKS), 10.0 ** (-1.0 / method.order))
     if method.implicit and count > 1:
-        fewer = -(-count // (4 if method.order > SURE and not runs.untold else 2))
+        fewer = -(-count // (4 if method.order > SURE and not runs.sudden else 2))
         try:
             return Beside(runs.run(replace(method, step=runs.output_step / fewer), progress=say), count / fewer)
         except ComputationError:

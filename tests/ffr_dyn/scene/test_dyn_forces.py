@@ -367,7 +367,7 @@ def test_a_scene_at_a_result_goes_on_with_its_turns():
     whole = integrate(scene, end=1.0, **settings)
     later = scene_at(scene, integrate(scene, end=0.5, **settings))
     result = integrate(later, start=0.5, end=1.0, **settings)
-    assert [force.turns for force in later.forces[:3]] == [1, 1, 1]
+    assert [force.turns for force in later.forces[:3]] == [2, 2, 2]
     for name in ("s.angle", "s.torque", "end.torque", "hold.torque"):
         np.testing.assert_allclose(result[name], whole[name][10:], rtol=0, atol=1e-9, err_msg=name)
 
