@@ -137,7 +137,7 @@ class _Runs:
 
     @cached_property
     def sudden(self) -> bool:
-        """Whether forces may change within a step, however short: only beside about twice the step has a run an order then."""
+        """Whether forces may change within a step, however short: a run has an order beside about twice the step at most."""
         system = self.assembled.system
         moved = any(callback.with_state for callback in system.user.callbacks)
         return bool(self.untold) or moved or any(force.sudden for force in forces_of(system.scene))

@@ -119,7 +119,7 @@ def _component(function: Callable[[float], Array], number: int, t: float) -> flo
 
 
 def _standing_out(changes: Array, values: Array) -> list[int]:
-    """The numbers of the changes of values that differ most, by more than rounding, from those of their neighbours but one."""
+    """The numbers of the changes of values that differ most from their neighbours but one, by more than rounding."""
     around = np.pad(changes, 2, mode="edge")
     excess = np.abs(changes - 0.5 * (around[:-4] + around[4:]))
     largest = np.argsort(-excess, kind="stable")[:MOST]

@@ -194,7 +194,9 @@ def dropped() -> Scene:
     """A block that bounces on a hard stop."""
     stop = JointStop("stop", "rail", 1e6, 1e-5, lower=0.0, damping=500.0, coordinate="stroke")
     body = Body("block", BLOCK, position=(0, 0.1, 0))
-    return Scene((body,), (replace(RAIL, axis=(0, 1, 0)),), forces=(stop,), ground={"O": (0, 0, 0)}, gravity=(0, -9.81, 0))
+    return Scene(
+        (body,), (replace(RAIL, axis=(0, 1, 0)),), forces=(stop,), ground={"O": (0, 0, 0)}, gravity=(0, -9.81, 0)
+    )
 
 
 def rubbed() -> Scene:
