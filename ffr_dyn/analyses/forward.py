@@ -214,8 +214,7 @@ def forward(
     check_method(method)
     assembled = begun(assemble(scene, time=start) if assembled is None else assembled, start, begin, method)
     common: dict[str, Any] = {"start": start, "end": end, "output_step": output_step, "stabilisation": stabilisation}
-    common |= {"outputs": outputs, "progress": progress, "stopwatch": stopwatch}
-    common["events"] = tuple(event for event in several("events", events, (Event,)) if event.stop)  # runs end alike
+    common |= {"outputs": outputs, "progress": progress, "stopwatch": stopwatch, "events": _ending(events)}
     wanted = Within() if method is None else method
     if isinstance(wanted, Within) or stabilisation == Projection():
         common["stabilisation"] = _tight(stabilisation, getattr(wanted, "accuracy", Within().accuracy))
@@ -229,6 +228,11 @@ def forward(
     if check is None and _cost(assembled, told.result) < QUICK:
         told = _checked(runs, method, count, kept, told.result)
     return _finished(runs, told, resume if path is None else path)
+
+
+def _ending(events: Sequence[Event]) -> tuple[Event, ...]:
+    """Those that end a run: runs that tell its error end at them, too."""
+    return tuple(event for event in several("events", events, (Event,)) if event.stop)
 
 
 def _tight(stabilisation: Stabilisation, accuracy: float) -> Stabilisation:
