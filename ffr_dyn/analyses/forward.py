@@ -57,6 +57,7 @@ from ffr_dyn.linear.departure import at_rest_in_part, departures, free_to_leave,
 from ffr_dyn.linear.steady_state import steadily
 from ffr_dyn.results.file import load_result, with_attributes
 from ffr_dyn.results.result import Result
+from ffr_dyn.scene.force_kinds import forces_of
 from ffr_dyn.scene.scene import Scene
 from ffr_prep.common.errors import ComputationError, InputError
 
@@ -154,6 +155,11 @@ class _Runs:
         times, fast = np.linspace(self.start, self.how["end"], count + 1), self.how["fast"]
         return untold_breaks(self.assembled.system, times, () if fast is None else fast.jumps[:, 1].tolist())
 
+    @cached_property
+    def sudden(self) -> bool:
+        """Whether forces may change within a step, however short: a run has an order beside about twice the step at most."""
+        return bool(self.untold) or self.feels or any(force.sudden for force in forces_of(self.scene))
+
     def run(self, method: Integrator, **more: Any) -> Result:
         """One run."""
         found = integrate(self.scene, method=method, assembled=self.assembled, **{**self.how, **more})
@@ -166,8 +172,8 @@ class _Runs:
         They go on at the same time, and progress is their mean; one after another beside a stopwatch, and with the user's
         Python functions, which would be called out of order.
         """
-        watched = any(callable(event.quantity) for event in self.how["events"])
-        lonely = self.how["stopwatch"] is not None or self.assembled.system.user.count or watched
+        python = self.assembled.system.user.count or any(callable(event.quantity) for event in self.how["events"])
+        lonely = self.how["stopwatch"] is not None or python
         progress, found, times = self.how["progress"], dict[int, Any](), [self.start] * len(calls)
 
         def heard(number: int, time: float) -> None:
@@ -201,8 +207,7 @@ def forward(
     """Integrate the equations of motion of a scene from `start` to `end` [s], keeping a row every `output_step` [s].
 
     method      : RK4(step), ROS2(step), ...; or `Within(accuracy)`, the default with 1e-3: the step is found that keeps
-                  positions and angles within the accuracy, relative to their ranges, and forces where they do not ring;
-                  constraints are projected to 1e-8 of it, or closer
+                  positions and angles within the accuracy of their ranges, forces where they do not ring, constraints to 1e-8 of it
     outputs     : names or patterns of the quantities to keep (`ffr_dyn.results.quantities.selected`), such as "*.power"
     events      : moments to find (`ffr_dyn.analyses.events`), listed in the result's attribute "events"; one may end the run
     check       : whether further runs tell the error of every output; default: where that takes seconds, or finds the step
@@ -363,7 +368,7 @@ def _told(runs: _Runs, trial: _Trial, other: Any, *longer: Any) -> _Trial:
     twins = (*trial.twins, *(twin for twin in longer if not _failed(twin)))
     errors = _errors(trial.result, other, order, twins)
     if farther is not None:
-        errors = larger(errors, _errors(trial.result, farther, order))
+        errors = larger(errors, _errors(trial.result, farther, order, ()))
     start = _start(runs, trial.method, trial.result, trial.twins[0]) if trial.twins else ()
     errors = with_start(errors, trial.result, *start) if start else errors
     return replace(trial, twins=twins, errors=errors, **_moments(trial.result, errors, other, order, twins))
@@ -385,7 +390,7 @@ def _further(
 ) -> list[Callable[[Say], Beside | None]]:
     """The further runs that tell the error of a run beside its twin: one with another step, and, beside a twin of half the
     step, one with a longer step; those of the last trial if its step is not too far."""
-    far = 2 if runs.untold or runs.feels else _leap(method)
+    far = 2 if runs.sudden else _leap(method)
     near = next((one for one in reversed(earlier) if one.twins and count <= far * one.count), None)
     if near is not None:
         ratio = count / near.count
@@ -396,14 +401,14 @@ def _further(
 
 
 def _other(runs: _Runs, method: Any, count: int, say: Say) -> Beside:
-    """The run with another step: about twice the step, or four times of a method of higher order unless a break lies within
+    """The run with another step: about twice the step, or four times of a method of higher order unless forces change within
     steps, where elastic forces are implicit and that is part of a row, else half of it; with a tenth of the tolerances of a
     method that chooses its steps, and work added up twice as often."""
     if method.controlled:
         finer = replace(method, tolerances=tightened(method.tolerances, 10))
         return Beside(runs.run(finer, progress=say, looks=2 * LOOKS), 10.0 ** (-1.0 / method.order))
     if method.implicit and count > 1:
-        fewer = -(-count // (4 if method.order > SURE and not (runs.untold or runs.feels) else 2))
+        fewer = -(-count // (4 if method.order > SURE and not runs.sudden else 2))
         try:
             return Beside(runs.run(replace(method, step=runs.output_step / fewer), progress=say), count / fewer)
         except ComputationError:

@@ -107,8 +107,7 @@ def integrate(
     events      : moments to find (`ffr_dyn.analyses.events`), listed in the result's attribute "events"; one may end the run
     path        : a result file written as the run goes on; a run that is stopped or killed leaves it readable
     resume      : a result file whose run goes on to the same bits; `end` may be later. A new file: a run from the start
-    progress    : called with the time reached, a few times a second
-    stopwatch   : takes the time of the integrator's compiled loop
+    progress    : called with the time reached, a few times a second;  stopwatch : takes the time of the compiled loop
     assembled   : what `assemble` made of the scene at `start`, for programs that run it more than once
     looks       : states from row to row of which work is added up, where the method chooses its steps
     fast        : what functions of time do within steps, which are divided there
@@ -127,16 +126,16 @@ def integrate(
     wanted = selected(assembled.system, outputs)
     path = resume if path is None else path
     mark = "" if path is None else _fingerprint(assembled, method, stabilisation, start, output_step, wanted)
-    assembled = assembled if fast is None else _with_divided_steps(assembled, fast, spacing)
+    assembled = _with_divided_steps(assembled, fast, spacing)
     header = _header(scene, assembled, method, stabilisation, (start, end, output_step))
-    shown_alone = path is None and not events
-    kept = _kept(assembled.system, wanted, rows) if shown_alone else Measured(assembled.system, wanted)
+    kept = _kept(assembled.system, wanted, rows) if path is None and not events else Measured(assembled.system, wanted)
     run = _begun(assembled, method, stabilisation, start, spacing, kept, resume, mark, fast)
     _check_resumed(run, substeps * rows, output_step / substeps)
     watcher = _watcher(assembled, run, method, stabilisation, spacing, events, resume) if events else None
-    watch = Stopwatch() if stopwatch is None else stopwatch
     with nullcontext() if path is None else _writer(path, scene, run, header, mark) as writer:
-        for times, part in _advance(assembled, run, method, start, substeps, rows, wanted, watch, watcher):
+        for times, part in _advance(
+            assembled, run, method, start, substeps, rows, wanted, stopwatch or Stopwatch(), watcher
+        ):
             if writer is not None:
                 writer.append(times, {name: quantity.values for name, quantity in part.items()}, _checkpoint(run, mark))
             if progress is not None:
@@ -154,7 +153,10 @@ def fast_within(system: System, method: Integrator, start: float, end: float, ou
     return fast_of(system, start, end, output_step, output_step / LOOKS if method.controlled else method.step)
 
 
-def _with_divided_steps(assembled: Assembled, fast: Fast, step: float) -> Assembled:
+def _with_divided_steps(assembled: Assembled, fast: Fast | None, step: float) -> Assembled:
+    """The scene, of which steps are divided where functions of time change faster."""
+    if fast is None:
+        return assembled
     every = assembled.all_rows
     return replace(
         assembled,

@@ -10,30 +10,38 @@ import numpy as np
 from ffr_dyn.functions.time_functions import as_time_function, constant, evaluate
 from ffr_dyn.results.result import Result
 from ffr_dyn.scene.drivers import Driver, PointDriver
+from ffr_dyn.scene.forces.places import OnJoint
 from ffr_dyn.scene.joints import Joint
 from ffr_dyn.scene.scene import Body, Scene, require_scene
 
 
 def scene_at(scene: Scene, result: Result, row: int = -1) -> Scene:
-    """The scene with its bodies where a row of a result has them, moving as they do there; forces on angles have the whole
-    turns that they have counted, where the result keeps them ("spring.angle").
+    """The scene with its bodies where a row of a result has them, moving as they do there.
+
+    Springs, stops and servos on angles keep the whole turns that they have counted by then.
+
+    Raises InputError where the result has not the bodies' R, p, v and omega_bar, or the angle of such a force.
 
     >>> later = fd.scene_at(scene, result)  # as it is at the end
     """
-    bodies = tuple(_body_at(body, result, row) for body in scene.bodies)
-    return replace(scene, bodies=bodies, forces=tuple(_force_at(force, result, row) for force in scene.forces))
-
-
-def _force_at(force: Any, result: Result, row: int) -> Any:
-    angle = f"{force.name}.angle"
-    counts = getattr(force, "turns", None) is not None and force.place.way == "angle" and angle in result
-    return replace(force, turns=round(float(result[angle][row]) / (2 * np.pi))) if counts else force
+    return replace(
+        scene,
+        bodies=tuple(_body_at(body, result, row) for body in scene.bodies),
+        forces=tuple(_force_at(force, result, row) for force in scene.forces),
+    )
 
 
 def _body_at(body: Body, result: Result, row: int) -> Body:
     now = {key: result[f"{body.name}.{name}"][row] for key, name in _HISTORIES.items()}
     elastic = {key: result[f"{body.name}.{key}"][row] for key in ("q", "q_dot") if body.model.n}
     return replace(body, **now, **elastic)
+
+
+def _force_at(force: Any, result: Result, row: int) -> Any:
+    """With its whole turns: the poses of the bodies tell an angle within half a turn."""
+    if not (hasattr(force, "turns") and isinstance(force.place, OnJoint) and force.place.coordinate == "angle"):
+        return force
+    return replace(force, turns=round(float(result[f"{force.name}.angle"][row]) / (2 * np.pi)))
 
 
 _HISTORIES = {"position": "R", "rotation": "p", "velocity": "v", "omega_bar": "omega_bar"}

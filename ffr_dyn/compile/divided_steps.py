@@ -72,11 +72,13 @@ def fast_of(system: System, start: float, end: float, output_step: float, step: 
     A Python function that changes all the time, as noise does, is left as it is called.
     Raises ComputationError where functions that are written change many times in every step.
     """
-    functions = system.model.functions
+    functions, lasts = system.model.functions, end - start
+    if not 0 < lasts < np.inf:
+        return None  # the run tells what is wrong with that
     made = made_of(functions.kind, functions.start, functions.data, system.model.rows.function, functions.switches)
     if slow(made, functions.kind, functions.start, step):
         return None
-    rows = np.linspace(start, end, 1 + min(MOST_ROWS, round((end - start) / output_step)))
+    rows = np.linspace(start, end, 1 + int(np.clip(round(lasts / output_step), 1, MOST_ROWS)))
     found = _with_python(system, made, rows, step) if (functions.kind == USER).any() else None
     if found is None:
         found = fast_changes(made, partial(_sampled, system, partial(_no_python, system)), rows, functions.breaks, step)

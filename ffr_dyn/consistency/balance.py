@@ -44,8 +44,11 @@ class Account:
     numbers: Array = field(default_factory=lambda: np.full(10, np.nan))
 
 
-def add_rows(account: Account, rows: Record, powers: Array) -> None:
-    """Go on by the rows that follow; powers (T, F + drivers) of all forces and drivers."""
+def add_rows(account: Account, rows: Record, powers: Array) -> Array:
+    """Go on by the rows that follow; powers (T, F + drivers) of all forces and drivers.
+
+    Returns (T,) [J] what of the energy they do not account for by each row.
+    """
     system, numbers = account.system, account.numbers
     stored, power = _stored(system, rows), _power(system, rows, powers)
     own = rows.energy[:, 0] + rows.energy[:, 1]
@@ -67,6 +70,7 @@ def add_rows(account: Account, rows: Record, powers: Array) -> None:
     numbers[MOST] = max(numbers[MOST], float(energy.max()))
     numbers[[TIME, WORK, OPEN, POWER, BEFORE]] = rows.time[-1], work[-1], left_open[-1], known[-1], known[-2]
     numbers[TOTAL] = total[-1]
+    return left
 
 
 def _breaks_between(account: Account, times: Array) -> Array:

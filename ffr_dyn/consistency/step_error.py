@@ -404,19 +404,25 @@ def too_coarse(run: Result) -> dict[str, float]:
     (half of what they differ by counts), which finds even a vibration that rows catch in the same phase again and again;
     every row of other outputs against the curve through the two before and the two after.
     """
-    scales = {name: scale for name, scale in ranges(run).items() if scale > 0}
-    if run.time.size <= 4:
+    scales, rows = {name: scale for name, scale in ranges(run).items() if scale > 0}, _evenly_spaced(run.time)
+    if rows <= 4:
         return {}
     rates = {name: rate for name in scales if (rate := _rate_of(name)) in run.quantities}
     off: dict[str, float] = {}
     for names in _batches(run, (name for name in scales if name not in rates)):
         y = _columns(run, names)
-        off |= zip(names, y.largest(np.abs(_off_curve(y.table)).max(axis=0)).tolist(), strict=True)
+        off |= zip(names, y.largest(np.abs(_off_curve(y.table[:rows])).max(axis=0)).tolist(), strict=True)
     for names in _batches(run, rates):
         y, w = _columns(run, names), _columns(run, (rates[name] for name in names)).table
         beside = 0.5 * (np.diff(y.table, axis=0) - 0.5 * np.diff(run.time)[:, None] * (w[:-1] + w[1:]))
         off |= zip(names, y.largest(np.abs(beside).max(axis=0)).tolist(), strict=True)
     return {name: share for name, scale in scales.items() if (share := off[name] / scale) > COARSE}
+
+
+def _evenly_spaced(times: Array) -> int:
+    """How many rows there are before that of an event between two of them, which ends a run."""
+    steps = np.diff(times)
+    return times.size - int(steps.size > 1 and steps[-1] < (1 - 1e-6) * steps[0])
 
 
 def from_rounding(run: Result) -> dict[str, float]:

@@ -89,6 +89,8 @@ def _derivatives(coefficients: Array, t: Array) -> Array:
 MOST = 8  # intervals of each kind that are looked into
 HALVINGS, BENT = 40, 20  # of an interval: of one in which something jumps, and of one with a kink
 LEFT = 0.2  # of a change, or of a change of slope, that is left in the smallest part
+STEADY = 0.75  # of it that is left by the last halving: half of it of what is smooth, however fast between the rows
+ROUNDING = 1e-12  # of the largest number of a function
 
 
 def hidden_breaks(function: Callable[[float], Array], times: Array) -> list[float]:
@@ -101,11 +103,11 @@ def hidden_breaks(function: Callable[[float], Array], times: Array) -> list[floa
     size, found = np.ptp(values, axis=0), list[float]()
     for c in range(3):
         changes = np.diff(values[:, c])
-        for k in _standing_out(changes):
+        for k in _standing_out(changes, values[:, c]):
             least = max(LEFT * abs(changes[k]), JUMP * size[c])
             found += _jumps(partial(_component, function, c), float(times[k]), float(times[k + 1]), least)
     bends = np.diff(values[:, 0], 2)
-    for k in _standing_out(bends):
+    for k in _standing_out(bends, values[:, 0]):
         least = max(LEFT * abs(bends[k]), JUMP * size[0])
         for time in _kinks(partial(_component, function, 0), float(times[k]), float(times[k + 2]), least):
             if not any(abs(time - t) <= times[k + 2] - times[k] for t in found):
@@ -117,18 +119,19 @@ def _component(function: Callable[[float], Array], number: int, t: float) -> flo
     return float(function(t)[number])
 
 
-def _standing_out(changes: Array) -> list[int]:
-    """The numbers of the changes that differ most from those of their neighbours but one."""
+def _standing_out(changes: Array, values: Array) -> list[int]:
+    """The numbers of the changes of values that differ most from their neighbours but one, by more than rounding."""
     around = np.pad(changes, 2, mode="edge")
     excess = np.abs(changes - 0.5 * (around[:-4] + around[4:]))
     largest = np.argsort(-excess, kind="stable")[:MOST]
-    return [int(k) for k in largest if excess[k] > 0]
+    return [int(k) for k in largest if excess[k] > ROUNDING * np.abs(values).max()]
 
 
 def _jumps(function: Callable[[float], float], early: float, late: float, least: float) -> list[float]:
     """When [s] a function changes most between two times, if it does so by that much in the smallest part of them."""
     low, high = function(early), function(late)
     for _ in range(HALVINGS):
+        before = abs(high - low)
         middle = 0.5 * (early + late)
         mid = function(middle)
         if abs(mid - low) > abs(high - mid):
@@ -137,17 +140,19 @@ def _jumps(function: Callable[[float], float], early: float, late: float, least:
             early, low = middle, mid
         if not abs(high - low) > least:
             return []
-    return [late]
+    return [late] if abs(high - low) > STEADY * before else []
 
 
 def _kinks(function: Callable[[float], float], early: float, late: float, least: float) -> list[float]:
     """When [s] a function bends most between two times, if it bends there by that much, taken for all of the time."""
     whole = width = late - early
+    bent = before = np.inf
     for _ in range(BENT):
         width *= 0.5
         starts = early + np.array([0.0, 0.5, 1.0]) * width
         bends = [abs(function(t) - 2 * function(t + 0.5 * width) + function(t + width)) for t in starts.tolist()]
         early = float(starts[int(np.argmax(bends))])
-        if not max(bends) * whole / width > least:
+        before, bent = bent, max(bends) * whole / width
+        if not bent > least:
             return []
-    return [early + 0.5 * width]
+    return [early + 0.5 * width] if bent > STEADY * before else []

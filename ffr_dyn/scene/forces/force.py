@@ -62,6 +62,7 @@ class Force(ABC):
     kernel   : its compiled form (see `ffr_dyn.kernels.simd.force_kernel`), or "package.module:name", imported when it is used
     acts, positive : what it is and which way it counts, for the table in docs/forces.md
     stores_energy  : it has an `energy`
+    sudden         : the motion may change it by all of itself within a step, as where a stop is met
     given    : how many components are given from outside, so that analyses can size them, 0 where the state makes the force;
                the numbers of its law begin with a factor for each, then their functions of time or -1
 
@@ -75,6 +76,7 @@ class Force(ABC):
     acts: ClassVar[str]
     positive: ClassVar[str]
     stores_energy: ClassVar[bool] = False
+    sudden: ClassVar[bool] = False
     given: ClassVar[int] = 0
 
     @property

@@ -42,6 +42,7 @@ class JointFriction(Force):
     kernel = "ffr_dyn.kernels.forces.friction:friction"
     acts = "−N (μ + (μ_s − μ) exp(−(ċ/v_s)²)) tanh(ċ/creep) − viscous ċ"
     positive = "increases c"
+    sudden = True
 
     name: str
     joint: str

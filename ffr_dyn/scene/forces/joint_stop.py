@@ -38,6 +38,7 @@ class JointStop(Force):
     kernel = "ffr_dyn.kernels.forces.stop:stop"
     acts = "one-sided spring-dampers beyond lower and upper"
     positive = "increases c"
+    sudden = True
 
     name: str
     joint: str

@@ -12,6 +12,7 @@ from synthetic import cloud
 
 from ffr_dyn.analyses.energy import EnergyWatch
 from ffr_dyn.analyses.integration import integrate
+from ffr_dyn.functions.formula import formula
 from ffr_dyn.functions.time_functions import harmonic, polynomial, user
 from ffr_dyn.integrators import RK4, ROS2, DormandPrince, HalfExplicit, Variational
 from ffr_dyn.integrators.stabilisation import Baumgarte, Drifting
@@ -19,6 +20,7 @@ from ffr_dyn.scene.drivers import Driver
 from ffr_dyn.scene.forces import Actuator, JointStop, Load, Servo, SpringDamper
 from ffr_dyn.scene.joints import Joint
 from ffr_dyn.scene.scene import Body, Scene
+from ffr_prep.body import rigid_body
 from ffr_prep.common.errors import ComputationError
 
 GROUND = {"O": (0, 0, 0), "P": (3, 0, 0), "Q": (1, 2, 0)}
@@ -154,3 +156,14 @@ def test_a_step_that_rk4_bears_is_not_stopped():
     result = integrate(scene, end=2000 * h, output_step=h, method=RK4(h))
     energy = result["energy.total"]
     assert energy.max() < 1.01 * energy[0]
+
+
+@pytest.mark.parametrize("method", [RK4(1e-3), DormandPrince()], ids=repr)
+def test_power_that_rows_catch_in_the_same_phase_is_no_doubt_of_the_steps(method):
+    """A force that is zero at all rows and does its work between them."""
+    push = Load("push", "ball.c", force=(formula("5 * (1 - cos(200 * pi * t))"), 0, 0))
+    ball = rigid_body("ball", mass=2.0, inertia=(1, 1, 1), points={"c": (0, 0, 0)})
+    scene = Scene((Body("ball", ball),), loads=(push,))
+    result = integrate(scene, end=0.5, output_step=0.01, method=method)
+    assert result["energy.kinetic"][-1] == pytest.approx((5.0 * 0.5) ** 2 / 4.0, rel=1e-3)
+    assert not [note for note in result.attributes["notes"] if "energy" in note]

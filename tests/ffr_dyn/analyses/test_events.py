@@ -17,6 +17,7 @@ from ffr_dyn.analyses.events import Event
 from ffr_dyn.analyses.forward import forward
 from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.analyses.run import run
+from ffr_dyn.functions.time_functions import polynomial
 from ffr_dyn.integrators import HHT, RK4, ROS2, ROS3, DormandPrince, GeneralisedAlpha, Within
 from ffr_dyn.integrators.stabilisation import Projection
 from ffr_dyn.integrators.tolerances import tolerances
@@ -85,6 +86,28 @@ def test_a_run_ends_at_an_event(tmp_path):
     read = load_result(path)
     np.testing.assert_array_equal(read["ball.c.position"], result["ball.c.position"])
     assert read.attributes["events"] == result.attributes["events"]
+
+
+def test_the_error_of_a_run_that_ends_at_an_event_is_that_up_to_it():
+    """No row of the event lies beside one of a run that went on: the error told was a third of the range."""
+    event = Event("far", "hinge.angle", 1.1, stop=True)
+    short, fine = (
+        forward(swinging(), end=1.0, output_step=0.05, method=RK4(step), events=[event]) for step in (0.0125, 0.00125)
+    )
+    assert short.time.size == fine.time.size < 21
+    for name, (told, _) in short.attributes["errors"].items():
+        true = np.abs(short[name] - fine[name]).max()
+        assert true <= 3.0 * told + 1e-10, name
+    assert short.attributes["errors"]["arm.R"][1] < 1e-3
+
+
+def test_what_would_fail_after_the_event_that_ends_a_run_is_not_run():
+    rope = Joint("rope", "distance", "ground.O", "ball.c", length=polynomial(1.0, -1.0))
+    scene = Scene((Body("ball", BALL, position=(1, 0, 0)),), (rope,), ground={"O": (0, 0, 0)})
+    wound = Event("wound", "ball.R.x", 0.5, stop=True)
+    result = forward(scene, end=2.0, output_step=0.1, events=[wound])
+    assert times(result) == pytest.approx([0.5], abs=1e-9)
+    assert result.attributes["errors"]["ball.R"][0] < 1e-6
 
 
 def test_a_python_function_and_a_quantity_give_the_same_moment():

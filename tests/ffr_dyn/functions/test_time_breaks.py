@@ -58,6 +58,8 @@ def test_hidden_jumps_and_kinks_are_found(broken, at):
         lambda t: np.exp(-(((t - 0.5) / 0.01) ** 2)),
         lambda t: 3.0,
         lambda t: t**4,
+        lambda t: 5 + 5 * np.sin(200 * np.pi * t) ** 2,  # the same at all rows, but for rounding
+        lambda t: 5 + 5 * np.sin(200.001 * np.pi * t) ** 2,
     ],
 )
 def test_what_is_smooth_has_no_hidden_breaks(smooth):

@@ -12,6 +12,7 @@ from synthetic import cloud
 from test_dyn_kernels import chain, moved, random_state
 
 from ffr_dyn.analyses.integration import integrate
+from ffr_dyn.analyses.states import scene_at
 from ffr_dyn.compile.engine import evaluate_at, load_at, new_engine
 from ffr_dyn.compile.scene_tables import compile_scene
 from ffr_dyn.consistency.assemble import assemble
@@ -352,6 +353,30 @@ def test_a_resumed_run_goes_on_with_its_turns(tmp_path):
     assert whole["s.angle"].min() >= 0
     assert whole["s.angle"][10] > 2 * np.pi
     assert result["s.angle"].tobytes() == whole["s.angle"].tobytes()
+
+
+def test_a_scene_at_a_result_goes_on_with_its_turns():
+    """A spring, a stop and a servo, of which the joint has turned by more than one turn."""
+    forces = (
+        JointSpring("s", "hinge", 2.0),
+        JointStop("end", "hinge", 50.0, 0.1, upper=8.0),
+        Servo("hold", "hinge", target=polynomial(7.0), kp=0.5, kd=0.0),
+        JointFriction("oil", "hinge", coulomb=0.0, creep=1.0, viscous=1e-3),
+    )
+    scene, settings = rotor(*forces, speed=30.0), {"output_step": 0.05, "method": RK4(5e-3)}
+    whole = integrate(scene, end=1.0, **settings)
+    later = scene_at(scene, integrate(scene, end=0.5, **settings))
+    result = integrate(later, start=0.5, end=1.0, **settings)
+    assert [force.turns for force in later.forces[:3]] == [2, 2, 2]
+    for name in ("s.angle", "s.torque", "end.torque", "hold.torque"):
+        np.testing.assert_allclose(result[name], whole[name][10:], rtol=0, atol=1e-9, err_msg=name)
+
+
+def test_a_scene_at_a_result_needs_the_angle_of_a_spring():
+    scene = rotor(JointSpring("s", "hinge", 2.0), speed=30.0)
+    result = integrate(scene, end=0.1, output_step=0.05, method=RK4(5e-3), outputs=("wheel.*",))
+    with pytest.raises(InputError, match=r"no quantity 's.angle'"):
+        scene_at(scene, result)
 
 
 def test_reactions_of_redundant_rows_see_the_same_turns():
