@@ -207,7 +207,7 @@ def forward(
     """Integrate the equations of motion of a scene from `start` to `end` [s], keeping a row every `output_step` [s].
 
     method      : RK4(step), ROS2(step), ...; or `Within(accuracy)`, the default with 1e-3: the step is found that keeps
-                  positions and angles within the accuracy of their ranges, forces where they do not ring, constraints to 1e-8 of it
+                  positions and angles within the accuracy of their ranges, forces where they do not ring, joints 1e-8 of it
     outputs     : names or patterns of the quantities to keep (`ffr_dyn.results.quantities.selected`), such as "*.power"
     events      : moments to find (`ffr_dyn.analyses.events`), listed in the result's attribute "events"; one may end the run
     check       : whether further runs tell the error of every output; default: where that takes seconds, or finds the step
@@ -215,7 +215,7 @@ def forward(
                   the motion of these analyses, of machines driven evenly; "as-given": with the scene's q and q_dot
     path        : a result file written as the run goes on; a run that is stopped or killed leaves it readable
     resume      : a result file whose run goes on to the same bits; `end` may be later. A new file: a run from the start
-    progress    : called with the time reached, a few times a second; with the mean of runs that go on at the same time
+    progress    : called with the time reached, or the mean of runs that go on at the same time, a few times a second
     stopwatch   : takes the time of the integrator's compiled loop, in all runs, which go on one after another then
     assembled   : what `assemble` made of the scene at `start`, for programs that run it more than once
 
@@ -230,9 +230,9 @@ def forward(
     check_output_step(output_step)
     check_method(method)
     assembled = begun(assemble(scene, time=start) if assembled is None else assembled, start, begin, method)
-    common: dict[str, Any] = {"start": start, "end": end, "output_step": output_step, "stabilisation": stabilisation}
-    common |= {"outputs": outputs, "events": events, "progress": progress, "stopwatch": stopwatch}
-    wanted = Within() if method is None else method
+    common: dict[str, Any] = {"start": start, "end": end, "output_step": output_step, "outputs": outputs}
+    common |= {"stabilisation": stabilisation, "events": events, "progress": progress, "stopwatch": stopwatch}
+    wanted = method or Within()
     if isinstance(wanted, Within) or stabilisation == Projection():
         common["stabilisation"] = _tight(stabilisation, getattr(wanted, "accuracy", Within().accuracy))
     common["fast"] = _fast(assembled.system, wanted, start, end, output_step)

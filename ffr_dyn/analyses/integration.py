@@ -133,9 +133,7 @@ def integrate(
     _check_resumed(run, substeps * rows, output_step / substeps)
     watcher = _watcher(assembled, run, method, stabilisation, spacing, events, resume) if events else None
     with nullcontext() if path is None else _writer(path, scene, run, header, mark) as writer:
-        for times, part in _advance(
-            assembled, run, method, start, substeps, rows, wanted, stopwatch or Stopwatch(), watcher
-        ):
+        for times, part in _advance(assembled, run, method, start, substeps, rows, wanted, stopwatch, watcher):
             if writer is not None:
                 writer.append(times, {name: quantity.values for name, quantity in part.items()}, _checkpoint(run, mark))
             if progress is not None:
@@ -299,7 +297,7 @@ def _advance(
     substeps: int,
     rows: int,
     wanted: Mapping[str, Entry],
-    watch: Stopwatch,
+    stopwatch: Stopwatch | None,
     watcher: Watcher | None = None,
 ) -> Iterator[tuple[Array, dict[str, Quantity]]]:
     """Yields (times, quantities) of output rows chunk after chunk, each about SECONDS_PER_CALL long.
@@ -307,7 +305,7 @@ def _advance(
     Where a quantity adds up over the steps, or events are looked for, every step is looked at and only the output rows are
     kept.
     """
-    system, steps = assembled.system, run.engine.tables.clock.steps
+    system, steps, watch = assembled.system, run.engine.tables.clock.steps, stopwatch or Stopwatch()
     looks = substeps if needs_every_step(wanted) or watcher is not None else 1
     ends = False
     count = _first_rows(system, method, substeps)
