@@ -362,16 +362,23 @@ def _told(runs: _Runs, trial: _Trial, other: Any, *longer: Any) -> _Trial:
     order = 1 if too_long else PARTLY_STIFF if share == 0.5 else trial.method.order
     if runs.untold:
         order = OVER_BREAKS if trial.method.order == 3 else 1
-    farther = _farther(runs, trial.method, trial.count) if runs.feels else None
-    if runs.feels:
-        order = min(order, order_shown(trial.result, other, farther, order))
     twins = (*trial.twins, *(twin for twin in longer if not _failed(twin)))
-    errors = _errors(trial.result, other, order, twins)
-    if farther is not None:
-        errors = larger(errors, _errors(trial.result, farther, order, ()))
+    errors, order = (
+        _felt(runs, trial, other, order, twins) if runs.feels else (_errors(trial.result, other, order, twins), order)
+    )
     start = _start(runs, trial.method, trial.result, trial.twins[0]) if trial.twins else ()
     errors = with_start(errors, trial.result, *start) if start else errors
     return replace(trial, twins=twins, errors=errors, **_moments(trial.result, errors, other, order, twins))
+
+
+def _felt(
+    runs: _Runs, trial: _Trial, other: Beside, order: float, twins: Sequence[Beside]
+) -> tuple[dict[str, StepError], float]:
+    """Errors, and the order that is shown by a third run, where Python functions of the state act."""
+    farther = _farther(runs, trial.method, trial.count)
+    shown = min(order, order_shown(trial.result, other, farther, order))
+    errors = _errors(trial.result, other, shown, twins)
+    return errors if farther is None else larger(errors, _errors(trial.result, farther, shown, ())), shown
 
 
 def _moments(

@@ -173,17 +173,10 @@ def _clocked(assembled: Assembled, method: Any, job: Job, outputs: tuple[str, ..
         if time.monotonic() - began > job.limit:
             raise ComputationError(f"took longer than {job.limit:g} s; it had reached t = {reached:.6g} s")
 
-    result = integrate(
-        assembled.system.scene,
-        **job.span.integrated,
-        assembled=assembled,
-        fast=fast_within(assembled.system, method, **job.span.integrated),
-        method=method,
-        stabilisation=job.stabilisation,
-        outputs=outputs,
-        progress=watch,
-        stopwatch=stopwatch,
-    )
+    system, span = assembled.system, job.span.integrated
+    how: dict[str, Any] = {"stabilisation": job.stabilisation, "outputs": outputs, "assembled": assembled}
+    how |= {"fast": fast_within(system, method, **span), "progress": watch, "stopwatch": stopwatch}
+    result = integrate(system.scene, **span, method=method, **how)
     return result, stopwatch.wall, stopwatch.cpu
 
 

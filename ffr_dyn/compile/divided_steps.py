@@ -72,29 +72,34 @@ def fast_of(system: System, start: float, end: float, output_step: float, step: 
     A Python function that changes all the time, as noise does, is left as it is called.
     Raises ComputationError where functions that are written change many times in every step.
     """
-    functions, lasts = system.model.functions, end - start
-    if not 0 < lasts < np.inf:
-        return None  # the run tells what is wrong with that
+    functions = system.model.functions
     made = made_of(functions.kind, functions.start, functions.data, system.model.rows.function, functions.switches)
-    if slow(made, functions.kind, functions.start, step):
-        return None
-    rows = np.linspace(start, end, 1 + int(np.clip(round(lasts / output_step), 1, MOST_ROWS)))
-    found = _with_python(system, made, rows, step) if (functions.kind == USER).any() else None
-    if found is None:
-        found = fast_changes(made, partial(_sampled, system, partial(_no_python, system)), rows, functions.breaks, step)
-    if found is None:
-        raise ComputationError(
-            f"{', '.join(dict.fromkeys(system.purposes))}: a function of time changes so often that steps of {step:.3g} s "
-            "cannot be divided as it asks for; take a shorter step, or leave out of it what is too fast to matter"
-        )
+    if not 0 < end - start < np.inf or slow(made, functions.kind, functions.start, step):
+        return None  # what is no span the run tells
+    rows = np.linspace(start, end, 1 + int(np.clip(round((end - start) / output_step), 1, MOST_ROWS)))
+    found = _with_python(system, made, rows, step) or _written(system, made, rows, step)
     names = dict.fromkeys(name for name, fast in zip(system.purposes, found.which, strict=True) if fast)
     changes = len(found.spans) + len(found.jumps) + len(found.switches)
     return Fast(found.spans, tuple(names), found.jumps, found.switches, step) if changes else None
 
 
+def _written(system: System, made: Made, rows: Array, step: float) -> Changes:
+    """Of functions that are not Python's."""
+    sample = partial(_sampled, system, partial(_no_python, system))
+    found = fast_changes(made, sample, rows, system.model.functions.breaks, step)
+    if found is None:
+        raise ComputationError(
+            f"{', '.join(dict.fromkeys(system.purposes))}: a function of time changes so often that steps of {step:.3g} s "
+            "cannot be divided as it asks for; take a shorter step, or leave out of it what is too fast to matter"
+        )
+    return found
+
+
 def _with_python(system: System, made: Made, rows: Array, step: float) -> Changes | None:
-    """With the Python functions looked into as often as a run would call them; None where that cannot be done: the run
-    tells what they raise, and when."""
+    """With the Python functions looked into as often as a run would call them; None where there are none, or that cannot be
+    done: the run tells what they raise, and when."""
+    if not (system.model.functions.kind == USER).any():
+        return None
     calls = np.clip((rows[-1] - rows[0]) / step * CALLS, FEWEST_CALLS, MOST_CALLS)
     looked = np.union1d(made.rows, np.linspace(rows[0], rows[-1], int(calls) + 1))
     python = _Python(system, (float(rows[0]), float(rows[-1])), ASIDE * step)
@@ -164,11 +169,15 @@ def divided(system: System, fast: Fast, step: float) -> System:
             "more than a run has room for; take a shorter step, or leave out what is too fast to matter"
         )
     functions = system.model.functions
-    jumps = np.column_stack([fast.jumps, fast.jumps[:, 1]])
-    sharp = np.concatenate([functions.breaks, jumps])
-    since = np.sort(sharp[:, SINCE])
-    near = np.searchsorted(since, times - BESIDE * step) < np.searchsorted(since, times + BESIDE * step)
-    breaks = np.concatenate([sharp, np.reshape([begins(t) for t in times[~near].tolist()], (-1, 3))])
-    functions = functions._replace(breaks=breaks[np.argsort(breaks[:, SINCE], kind="stable")])
-    piece = in_one_piece(system.model._replace(functions=functions))
+    breaks = _with_times(np.concatenate([functions.breaks, fast.jumps[:, [0, 1, 1]]]), times, BESIDE * step)
+    piece = in_one_piece(system.model._replace(functions=functions._replace(breaks=breaks)))
     return replace(system, model=piece.tables, words=piece.words)
+
+
+def _with_times(breaks: Array, times: Array, apart: float) -> Array:
+    """Breaks in order, and with them the times that are so far apart from them."""
+    since = np.sort(breaks[:, SINCE])
+    near = np.searchsorted(since, times - apart) < np.searchsorted(since, times + apart)
+    every = np.concatenate([breaks, np.reshape([begins(t) for t in times[~near].tolist()], (-1, 3))])
+    found: Array = every[np.argsort(every[:, SINCE], kind="stable")]
+    return found

@@ -57,24 +57,18 @@ class Made:
 
 def made_of(kind: Array, start: Array, data: Array, driving: Array, switches: Array) -> Made:
     """Of functions in the tables of the kernels (`ffr_dyn.kernels.tables.Functions`); driving : rows that drive something."""
-    count, roots = kind.size, np.ones(kind.size, dtype=bool)
-    turning, angles = set[int](), set[int]()
-    for op, first, second in (
-        data[start[k] + np.array([0, 2, 3])].astype(int) for k in np.flatnonzero(kind == OPERATION)
-    ):
-        roots[[first, second]] = False
-        if op not in LINEAR:
-            turning.add(int(second if op == DIVIDE else first))
-        if op in (SIN, COS):
-            angles.add(int(first))
-    speeds = [abs(data[start[k] + 2]) for k in np.flatnonzero(kind == HARMONIC) if data[start[k] + 1]]
-    rows = [data[start[k] + 2 : start[k] + 3 + int(data[start[k]])] for k in np.flatnonzero(kind == PIECEWISE)]
+    numbers = start[:-1][kind == OPERATION, None] + [0, 2, 3]
+    op, first, second = data[numbers].astype(int).reshape(-1, 3).T
+    number, of_tables = np.arange(kind.size), start[:-1][kind == PIECEWISE].tolist()
+    roots = ~np.isin(number, [first, second])
+    rows = [data[k + 2 : k + 3 + int(data[k])] for k in of_tables]
+    waves = start[:-1][kind == HARMONIC]
     return Made(
         roots,
-        roots & np.isin(np.arange(count), driving),
-        np.array(sorted(turning), dtype=int),
-        np.array(sorted(angles), dtype=int),
-        float(max(speeds, default=0.0)),
+        roots & np.isin(number, driving),
+        np.unique(np.where(op == DIVIDE, second, first)[~np.isin(op, LINEAR)]),
+        np.unique(first[np.isin(op, (SIN, COS))]),
+        float(np.abs(data[waves + 2] * (data[waves + 1] != 0)).max(initial=0.0)),
         np.unique(np.concatenate([np.zeros(0), *rows])),
         switches,
     )
@@ -140,19 +134,16 @@ def fast_changes(
     times : (T,) in order, from which the search begins;  breaks : as of `breaks.declared_breaks`
     most  : spans of time that are looked into
     """
-    spans, levels, looked = _between(sample, times, breaks), list[_Looked](), 0
+    spans, levels = _between(sample, times, breaks), list[_Looked]()
     known = _extremes(np.concatenate([spans.first, spans.last]))
     least = SHORTEST * step + ROUNDING * float(np.abs(times).max())
-    while spans.early.size:
-        looked += spans.early.size
-        if looked > most:
-            return None
-        at, time, seen = _candidates(of, sample, spans)
-        known = _wider(known, _extremes(seen))
-        off = _off(of, spans[at], time, seen, known)
-        level, spans = _divided(of, sample, spans, (at, time, seen, off), least)
+    while spans.early.size and most >= spans.early.size:
+        most -= spans.early.size
+        found = _candidates(of, sample, spans)
+        known = _wider(known, _extremes(found.seen))
+        level, spans = _divided(of, sample, spans, (found, _off(of, spans[found.at], found, known)), least)
         levels.append(level)
-    return _needed(of, levels, step)
+    return None if spans.early.size else _changes(of, levels, step)
 
 
 def _between(sample: Sample, times: Array, breaks: Array) -> _Spans:
@@ -176,8 +167,17 @@ def _wider(one: Extremes, other: Extremes) -> Extremes:
     return np.minimum(one[0], other[0]), np.maximum(one[1], other[1])
 
 
-def _candidates(of: Made, sample: Sample, spans: _Spans) -> tuple[Array, Array, Array]:
+@dataclass(frozen=True)
+class _Candidates:
     """Times at which spans are looked into: (K,) numbers of the spans, (K,) times, (K, F, 3) what is seen."""
+
+    at: Array
+    time: Array
+    seen: Array
+
+
+def _candidates(of: Made, sample: Sample, spans: _Spans) -> _Candidates:
+    """The middle of every span, rows of tables, and where what an operation is applied to turns back."""
     n = spans.early.size
     at, time = [np.arange(n)], [0.5 * (spans.early + spans.late)]
     row = np.searchsorted(spans.early, of.rows, side="right") - 1
@@ -186,7 +186,7 @@ def _candidates(of: Made, sample: Sample, spans: _Spans) -> tuple[Array, Array, 
         at.append(numbers)
         time.append(times)
     where, when = np.concatenate(at), np.concatenate(time)
-    return where, when, sample(when)
+    return _Candidates(where, when, sample(when))
 
 
 def _turns(of: Made, sample: Sample, spans: _Spans) -> tuple[Array, Array]:
@@ -205,8 +205,9 @@ def _turns(of: Made, sample: Sample, spans: _Spans) -> tuple[Array, Array]:
     return at, time
 
 
-def _off(of: Made, spans: _Spans, time: Array, seen: Array, known: Extremes) -> Array:
+def _off(of: Made, spans: _Spans, within: _Candidates, known: Extremes) -> Array:
     """(K, F) how far functions are off the cubics of K spans at times within, over what they may be off."""
+    time, seen = within.time, within.seen
     size = np.maximum(known[1] - known[0], CONSTANT * np.maximum(np.abs(known[0]), np.abs(known[1])))
     size = np.where(np.isfinite(size) & (size > 0), size, np.inf)
     width = (spans.late - spans.early)[:, None]
@@ -223,30 +224,34 @@ def _off(of: Made, spans: _Spans, time: Array, seen: Array, known: Extremes) -> 
 
 
 def _divided(
-    of: Made, sample: Sample, spans: _Spans, looked: tuple[Array, Array, Array, Array], least: float
+    of: Made, sample: Sample, spans: _Spans, looked: tuple[_Candidates, Array], least: float
 ) -> tuple[_Looked, _Spans]:
-    """What has come of looking into spans, and the parts of those that are divided: where something switches, or at the time
-    at which something is farthest off."""
-    at, time, seen, distance = looked
+    """What has come of looking into spans, and the parts of those that are divided."""
+    found, distance = looked
     n, width = spans.early.size, spans.late - spans.early
     worst = np.zeros((n, distance.shape[1]))
-    np.maximum.at(worst, at, distance)
-    order = np.lexsort((-distance.max(axis=1, initial=0.0), at))
-    best = order[np.searchsorted(at[order], np.arange(n))]  # a candidate of each span
-    switches = _switched(of, spans.first, spans.last)
-    wanted = (worst > 1.0).any(axis=1) | _turned(of, spans, width) | switches.any(axis=1)
+    np.maximum.at(worst, found.at, distance)
+    order = np.lexsort((-distance.max(axis=1, initial=0.0), found.at))
+    best = order[np.searchsorted(found.at[order], np.arange(n))]  # candidate of each span
+    switches = np.asarray(_switched(of, spans.first, spans.last).any(axis=1))
+    wanted = (worst > 1.0).any(axis=1) | _turned(of, spans, width) | switches
     divided = np.flatnonzero(wanted & (width > least))
-    end, begin = time[best[divided]].copy(), time[best[divided]].copy()
-    last, first = seen[best[divided]].copy(), seen[best[divided]].copy()
-    jumping = np.flatnonzero(switches[divided].any(axis=1))
-    if jumping.size:
-        end[jumping], begin[jumping] = _beside_switch(of, sample, spans[divided[jumping]])
-        last[jumping], first[jumping] = sample(end[jumping]), sample(begin[jumping])
-    parts = spans[divided]
-    halves = (parts.early, begin), (end, parts.late), (parts.first, first), (last, parts.last)
-    off = (worst > 1.0) & of.roots & (switches.sum(axis=1) == 0)[:, None]
-    level = _Looked(spans, off, (worst > 1.0).any(axis=1) & (width <= least), begin[jumping], divided)
-    return level, _Spans(*(np.concatenate(both) for both in halves))
+    at, switching = best[divided], switches[divided]
+    parts, switched = _halves(of, sample, spans[divided], (found.time[at], found.seen[at], switching))
+    off = (worst > 1.0) & of.roots & ~switches[:, None]
+    return _Looked(spans, off, (worst > 1.0).any(axis=1) & (width <= least), switched, divided), parts
+
+
+def _halves(of: Made, sample: Sample, spans: _Spans, best: tuple[Array, Array, Array]) -> tuple[_Spans, Array]:
+    """The parts of spans, all earlier ones first, and when something switches that divides them; best : the times at which
+    they are divided elsewhere, what is seen then, and whether something switches."""
+    time, seen, switching = best
+    end, begin, last, first = time.copy(), time.copy(), seen.copy(), seen.copy()
+    if switching.any():
+        end[switching], begin[switching] = _beside_switch(of, sample, spans[switching])
+        last[switching], first[switching] = sample(end[switching]), sample(begin[switching])
+    both = (spans.early, begin), (end, spans.late), (spans.first, first), (last, spans.last)
+    return _Spans(*(np.concatenate(each) for each in both)), begin[switching]
 
 
 def _turned(of: Made, spans: _Spans, width: Array) -> Array:
@@ -280,33 +285,38 @@ def _beside_switch(of: Made, sample: Sample, spans: _Spans) -> tuple[Array, Arra
     return early, late
 
 
-def _needed(of: Made, levels: list[_Looked], step: float) -> Changes:
-    """The shortest spans over which functions are no longer off, as far as these are shorter than a step. Where a function
-    jumps it is off however short a span is: this is not what spans around a jump are needed for."""
-    needed, below = list[Array](), np.zeros((2, 0), dtype=bool)
-    for level in reversed(levels):
-        jump, need = level.jumps.copy(), np.zeros(level.jumps.size, dtype=bool)
-        if level.divided.size:
-            inner_need, inner_jump = (part.reshape(2, -1).any(axis=0) for part in below)
-            jump[level.divided] |= inner_jump
-            need[level.divided] = inner_need
-        need |= level.off.any(axis=1) & ~jump
-        needed.append(need)
-        below = np.array([need, jump])
-    found, which = list[Array](), np.zeros(of.roots.size, dtype=bool)
+def _changes(of: Made, levels: list[_Looked], step: float) -> Changes:
+    """The shortest spans over which functions are no longer off, as far as these are shorter than a step."""
+    found, which, needed = list[Array](), np.zeros(of.roots.size, dtype=bool), _needed(levels)
     wanted = np.zeros(levels[0].jumps.size, dtype=bool)
-    for level, need in zip(levels, reversed(needed), strict=True):
-        short = wanted & ~need & (level.spans.late - level.spans.early < step)
-        found.append(np.column_stack([level.spans.early[short], level.spans.late[short]]))
-        of_parts = need[level.divided]
-        which |= (level.off & need[:, None] & (0.5 * (level.spans.late - level.spans.early) < step)[:, None]).any(
-            axis=0
-        )
-        wanted = np.concatenate([of_parts, of_parts])
-    jumps = [np.column_stack([level.spans.early, level.spans.late])[level.jumps] for level in levels]
+    for level, need in zip(levels, needed, strict=True):
+        width = level.spans.late - level.spans.early
+        found.append(_ends(level.spans[wanted & ~need & (width < step)]))
+        which |= level.off[need & (0.5 * width < step)].any(axis=0)
+        wanted = np.tile(need[level.divided], 2)
+    jumps = [_ends(level.spans[level.jumps]) for level in levels]
     switches = [level.switches for level in levels]
     spans, jumping, switching = (np.unique(np.concatenate(every), axis=0) for every in (found, jumps, switches))
     return Changes(spans, which, jumping, switching)
+
+
+def _ends(spans: _Spans) -> Array:
+    return np.column_stack([spans.early, spans.late])
+
+
+def _needed(levels: list[_Looked]) -> list[Array]:
+    """Of every level (N,) the spans whose parts are needed. Where a function jumps it is off however short a span is: this is
+    not what spans around a jump are needed for."""
+    needed, below = list[Array](), np.zeros((2, 0), dtype=bool)
+    for level in reversed(levels):
+        need, jump = np.zeros(level.jumps.size, dtype=bool), level.jumps.copy()
+        inner = np.asarray(below.reshape(2, 2, -1).any(axis=1))
+        need[level.divided] = inner[0]
+        jump[level.divided] |= inner[1]
+        need |= level.off.any(axis=1) & ~jump
+        needed.append(need)
+        below = np.array([need, jump])
+    return needed[::-1]
 
 
 def divisions(spans: Array, parts: int) -> Array:

@@ -440,15 +440,20 @@ def _check_connected(mesh: Mesh) -> None:
             "piece: join the parts (shared nodes), or make each a body of its own"
         )
     by_faces, doubled = parts_and_overlaps(_pairs(mesh))
-    if doubled.size:
-        raise InputError(
-            f"{doubled.size} elements overlap, the first being element {doubled[0]} at {_at(_centres(mesh)[doubled[0]])}: "
-            "they lie on the same side of a face, so there is more mass than volume; remove one of what is meshed twice"
-        )
+    _check_single(mesh, doubled)
     if by_faces.max() > 0:
         raise InputError(
             f"the mesh has {by_faces.max() + 1} parts that touch at nodes or edges only, a hinge and not a joint of "
             f"solids: {_parts_in_words(mesh, by_faces)}. Let them share whole element faces"
+        )
+
+
+def _check_single(mesh: Mesh, doubled: Array) -> None:
+    """InputError where elements, by number, are on one side of a face with others."""
+    if doubled.size:
+        raise InputError(
+            f"{doubled.size} elements overlap, the first being element {doubled[0]} at {_at(_centres(mesh)[doubled[0]])}: "
+            "they lie on the same side of a face, so there is more mass than volume; remove one of what is meshed twice"
         )
 
 

@@ -184,7 +184,7 @@ def _record(
         "interfaces": [described(interface) for interface in interfaces],
         "warnings": [
             *overlap_doubts(frame),
-            *dict.fromkeys(doubt for material in materials for doubt in material_doubts(material)),
+            *dict.fromkeys(said for one in materials for said in material_doubts(one)),
         ],
     }
 
