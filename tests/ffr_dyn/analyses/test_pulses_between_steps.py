@@ -49,8 +49,19 @@ def true(name):
     return found
 
 
-@pytest.mark.parametrize("name", PULSES)
-@pytest.mark.parametrize("method", METHODS, ids=lambda one: type(one).__name__)
+def _seldom(name, method):
+    """All pulses by the default, all methods for one of them; the others are for the slow tests."""
+    return () if name == "gauss" or method is None else pytest.mark.slow
+
+
+@pytest.mark.parametrize(
+    ("name", "method"),
+    [
+        pytest.param(name, method, id=f"{name}-{type(method).__name__}", marks=_seldom(name, method))
+        for name in PULSES
+        for method in METHODS
+    ],
+)
 def test_a_pulse_between_steps_is_seen_and_its_error_told(name, method):
     error, told, result = off(shaken("load", PULSES[name][0]), method, true(name), check=True)
     assert error <= (2e-3 if method is None else 2e-2)
