@@ -57,6 +57,7 @@ from ffr_dyn.linear.departure import at_rest_in_part, departures, free_to_leave,
 from ffr_dyn.linear.steady_state import steadily
 from ffr_dyn.results.file import load_result, with_attributes
 from ffr_dyn.results.result import Result
+from ffr_dyn.scene.checks import several
 from ffr_dyn.scene.force_kinds import forces_of
 from ffr_dyn.scene.scene import Scene
 from ffr_prep.common.errors import ComputationError, InputError
@@ -231,7 +232,12 @@ def forward(
     check_method(method)
     assembled = begun(assemble(scene, time=start) if assembled is None else assembled, start, begin, method)
     common: dict[str, Any] = {"start": start, "end": end, "output_step": output_step, "outputs": outputs}
-    common |= {"stabilisation": stabilisation, "events": events, "progress": progress, "stopwatch": stopwatch}
+    common |= {
+        "stabilisation": stabilisation,
+        "events": several("events", events, (Event,)),
+        "progress": progress,
+        "stopwatch": stopwatch,
+    }
     wanted = method or Within()
     if isinstance(wanted, Within) or stabilisation == Projection():
         common["stabilisation"] = _tight(stabilisation, getattr(wanted, "accuracy", Within().accuracy))

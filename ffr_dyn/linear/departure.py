@@ -62,18 +62,25 @@ def pushed(assembled: Assembled, time: float, lasts: float) -> Assembled:
 
 
 def at_rest_in_part(run: Result, system: System) -> bool:
-    """Whether something is left alone in a run that others might disturb: a body that does not turn, or in space not about
-    one of its axes, or a mode that stays as it is. Where all moves, the steps are a disturbance, and their error tells."""
+    """Whether a body stays where it is in a run, or in space spins evenly about an axis, as others might disturb. Where all
+    moves, the steps are a disturbance, and their error tells."""
     spatial = not any(normal >= 0 for normal in system.layout.normals)
-    found = list[Array]()
-    for name, quantity in run.quantities.items():
-        values = quantity.values.reshape(run.time.size, -1)
-        moved, size = np.ptp(values, axis=0), np.abs(values).max(initial=0.0)
-        if name.endswith(".p"):
-            found.append(np.atleast_1d(moved.max(initial=0.0) <= STILL))
-        if name.endswith(".q") or (spatial and name.endswith(".omega_bar")):
-            found.append(moved <= STILL * size)
-    return not found or bool(np.concatenate(found).any())
+    for body in system.scene.bodies:
+        if f"{body.name}.R" not in run.quantities or f"{body.name}.p" not in run.quantities:
+            return True
+        size = body.model.size or 1.0
+        if _moved(run, f"{body.name}.R").max() <= STILL * size and _moved(run, f"{body.name}.p").max() <= STILL:
+            return True
+        if spatial and f"{body.name}.omega_bar" in run.quantities:
+            rates = _moved(run, f"{body.name}.omega_bar")
+            if rates.min() <= STILL * np.abs(run[f"{body.name}.omega_bar"]).max():
+                return True
+    return False
+
+
+def _moved(run: Result, name: str) -> Array:
+    """(K,) the range of each component."""
+    return np.ptp(run[name].reshape(run.time.size, -1), axis=0)
 
 
 def places(system: System) -> list[str]:
