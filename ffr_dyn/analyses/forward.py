@@ -232,18 +232,13 @@ def forward(
     check_method(method)
     assembled = begun(assemble(scene, time=start) if assembled is None else assembled, start, begin, method)
     common: dict[str, Any] = {"start": start, "end": end, "output_step": output_step, "outputs": outputs}
-    common |= {
-        "stabilisation": stabilisation,
-        "events": several("events", events, (Event,)),
-        "progress": progress,
-        "stopwatch": stopwatch,
-    }
+    common |= {"stabilisation": stabilisation, "progress": progress, "stopwatch": stopwatch}
+    common["events"] = several("events", events, (Event,))
     wanted = method or Within()
     if isinstance(wanted, Within) or stabilisation == Projection():
         common["stabilisation"] = _tight(stabilisation, getattr(wanted, "accuracy", Within().accuracy))
     common["fast"] = _fast(assembled.system, wanted, start, end, output_step)
-    runs = _Runs(scene, assembled, start, output_step, common, begin)
-    kept = {"path": path, "resume": resume}
+    runs, kept = _Runs(scene, assembled, start, output_step, common, begin), {"path": path, "resume": resume}
     method, count = _resumed(resume, wanted, output_step)
     if isinstance(method, Within):
         return _searched(runs, method, kept, count)
