@@ -106,8 +106,12 @@ def _with_python(system: System, made: Made, rows: Array, step: float) -> Change
     try:
         sample = partial(_sampled, system, python.numbers)
         return fast_changes(replace(made, rows=looked), sample, rows, system.model.functions.breaks, step, int(calls))
-    except Exception:
+    except _NotToBeCalledError:
         return None
+
+
+class _NotToBeCalledError(Exception):
+    """A Python function of the user has raised something."""
 
 
 class _Python:
@@ -132,7 +136,7 @@ class _Python:
     def _of(self, callback: Callback, t: float) -> Array:
         key = callback.slot, t
         if key not in self.known:
-            self.known[key] = values = of_time(callback, t)
+            self.known[key] = values = _called(callback, t)
             if np.isnan(values[1]):
                 values[1] = self._rate(callback, t, float(values[0]))
         return self.known[key]
@@ -142,9 +146,16 @@ class _Python:
         before = self.least[max(int(np.searchsorted(self.least, t, side="right")) - 1, 0)]
         behind = self.most[min(int(np.searchsorted(self.most, t)), self.most.size - 1)]
         beside = (max(t - self.aside, float(before)), min(t + self.aside, float(behind)))
-        rates = [(float(of_time(callback, s)[0]) - value) / (s - t) for s in beside if s != t]
+        rates = [(float(_called(callback, s)[0]) - value) / (s - t) for s in beside if s != t]
         least, most = min(rates, default=0.0), max(rates, default=0.0)
         return max(least, 0.0) + min(most, 0.0)
+
+
+def _called(callback: Callback, t: float) -> Array:
+    try:
+        return of_time(callback, t)
+    except Exception as error:
+        raise _NotToBeCalledError from error
 
 
 def _no_python(system: System, times: Array) -> Array:

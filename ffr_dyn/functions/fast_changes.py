@@ -141,7 +141,9 @@ def fast_changes(
         most -= spans.early.size
         found = _candidates(of, sample, spans)
         known = _wider(known, _extremes(found.seen))
-        level, spans = _divided(of, sample, spans, (found, _off(of, spans[found.at], found, known)), least)
+        with np.errstate(all="ignore"):  # rates of a root are infinite where it ends: nothing is told there
+            off = _off(of, spans[found.at], found, known)
+        level, spans = _divided(of, sample, spans, (found, off), least)
         levels.append(level)
     return None if spans.early.size else _changes(of, levels, step)
 
@@ -192,7 +194,7 @@ def _candidates(of: Made, sample: Sample, spans: _Spans) -> _Candidates:
 def _turns(of: Made, sample: Sample, spans: _Spans) -> tuple[Array, Array]:
     """Where what an operation is applied to turns back: numbers of the spans, times."""
     a, b = spans.first[:, of.turning, 1], spans.last[:, of.turning, 1]
-    at, which = np.nonzero(a * b < 0)
+    at, which = np.nonzero(np.sign(a) * np.sign(b) < 0)
     if not at.size:
         return at, np.zeros(0)
     rate, other, row = a[at, which], b[at, which], of.turning[which]
@@ -200,7 +202,8 @@ def _turns(of: Made, sample: Sample, spans: _Spans) -> tuple[Array, Array]:
     time = early + (late - early) * rate / (rate - other)
     for _ in range(TURNS):
         seen = sample(time)[np.arange(at.size), row]
-        better = time - seen[:, 1] / seen[:, 2]
+        with np.errstate(all="ignore"):  # without a second derivative there is nothing better
+            better = time - seen[:, 1] / seen[:, 2]
         time = np.where((better > early) & (better < late), better, time)
     return at, time
 

@@ -128,3 +128,8 @@ def test_parts_are_in_proportion_to_the_step():
     assert count[STEP / 4] == pytest.approx(4 * PARTS * spans, abs=spans)
     at = divided(system, found, STEP).model.functions.breaks[:, SINCE]
     assert (np.diff(at) > 0).all()
+
+
+@pytest.mark.parametrize("text", ["1 / (t - 0.5013)", "sqrt(t)", "exp(1e3 * sin(9 * t))", "1e300 * t * t"])
+def test_what_has_no_bounds_is_looked_at_without_a_warning(text):
+    fast(formula(text))
