@@ -30,7 +30,8 @@ LEAVES = (
     1e3  # times the push: what a machine is off its drawing by, 1e-6 of its size, is then as large as errors of a run
 )
 FULL, ROWS = 0.3, 3  # of the largest difference; rows in which the first half of its decades is seen
-STILL = 1e-10  # of the largest of its kind, or of a turn, by which what is left alone moves by rounding
+STAYS = 1e-2  # of its size, of a turn, by which a body that stays moves as it vibrates
+STILL = 1e-10  # of a rate, by which one that is even changes by rounding
 LATE = 0.45  # of the time in which a difference grows LEAVES times, that half of its decades take at least
 POSES, MOVES = re.compile(r"\.(position|R|p)$"), re.compile(r"\.(position|R|p|angle|stroke|displacement|rotation)$")
 
@@ -69,7 +70,7 @@ def at_rest_in_part(run: Result, system: System) -> bool:
         if f"{body.name}.R" not in run.quantities or f"{body.name}.p" not in run.quantities:
             return True
         size = body.model.size or 1.0
-        if _moved(run, f"{body.name}.R").max() <= STILL * size and _moved(run, f"{body.name}.p").max() <= STILL:
+        if _moved(run, f"{body.name}.R").max() <= STAYS * size and _moved(run, f"{body.name}.p").max() <= STAYS:
             return True
         if spatial and f"{body.name}.omega_bar" in run.quantities:
             rates = _moved(run, f"{body.name}.omega_bar")

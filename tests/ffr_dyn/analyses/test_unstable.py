@@ -16,6 +16,7 @@ from ffr_dyn.scene.drivers import Driver
 from ffr_dyn.scene.forces import JointSpring, Load
 from ffr_dyn.scene.joints import Joint
 from ffr_dyn.scene.scene import Body, Scene
+from ffr_dyn.variants.mean_axis import with_mean_axis_bodies
 from ffr_prep.body import rigid_body
 
 GROUND = {"ground": {"O": (0, 0, 0)}}
@@ -68,6 +69,7 @@ LEAVING = {
     "strut": (column(1.5), 0.5, 0.01),
     "undamped strut": (column(1.5, 0.0), 0.5, 0.01),
     "strut under a load that grows": (column("3*t"), 1.0, 0.01),
+    "strut whose frame moves as it vibrates": (with_mean_axis_bodies(column(1.5)), 0.5, 0.01),
     "strut with few rows": (column(1.5), 3.0, 0.5),
     "pendulum": (pendulum(0.3), 4.0, 0.02),
     "pendulum on a ball": (pendulum(0.3, "spherical"), 4.0, 0.02),
