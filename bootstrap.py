@@ -68,6 +68,7 @@ CHECKS = {
     ),
 }
 SITE = Path("build") / "site"
+AS_TEXT = ("--define", "plot_gallery=0")
 LINES_OF_AN_ERROR = 15
 SIGNS_OF_NO_NETWORK = (
     "Temporary failure",
@@ -149,16 +150,20 @@ def demo() -> int:
 
 def site(*, links: bool) -> int:
     """The pages, and where to open them."""
-    passed = build_pages() and (not links or check("links", [*_pages("linkcheck"), "--define", "plot_gallery=0"]))
+    passed = build_pages() and (not links or check("links", [*_pages("linkcheck"), *AS_TEXT]))
     print(HOME / SITE / "html" / "index.html")
     return 0 if passed else 1
 
 
 def build_pages() -> bool:
     """Make all pages anew, every example executed."""
+    remove_pages()
+    return check("site", _pages("html"))
+
+
+def remove_pages() -> None:
     for folder in (HOME / SITE / "html", HOME / "docs" / "gallery"):
         shutil.rmtree(folder, ignore_errors=True)
-    return check("site", _pages("html"))
 
 
 def _pages(builder: str) -> list[str]:
@@ -169,7 +174,7 @@ def _pages(builder: str) -> list[str]:
 
 def test(*, slow: bool) -> int:
     """Every check, and the tests last: their closing line ends the output."""
-    passed = [check_together(CHECKS), build_pages()]
+    passed = checked_in_full() if slow else checked()
     selection = ["-m", ""] if slow else []
     print("pytest", flush=True)
     # A process on every core, each of which does whole files, with one thread: together they would wait for each other.
@@ -179,7 +184,18 @@ def test(*, slow: bool) -> int:
     tests = subprocess.run(command, cwd=HOME, env={**environment(), "OMP_NUM_THREADS": "1"})
     if tests.returncode < 0:
         print(f"\npytest was ended by signal {-tests.returncode}: its tests are not complete.", flush=True)
-    return 0 if all(passed) and tests.returncode == 0 else 1
+    return 0 if passed and tests.returncode == 0 else 1
+
+
+def checked() -> bool:
+    """All checks at once, with the pages as text: examples of the gallery are shown, not run."""
+    remove_pages()
+    return check_together({**CHECKS, "site": [*_pages("html"), *AS_TEXT]})
+
+
+def checked_in_full() -> bool:
+    """All checks, and the pages after them, whose examples find the kernels compiled then."""
+    return all([check_together(CHECKS), build_pages()])
 
 
 def check(title: str, command: Sequence[str]) -> bool:

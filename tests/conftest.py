@@ -17,6 +17,33 @@ sys.path += sorted(str(folder) for folder in Path(__file__).parent.rglob("[!_.]*
 threadpool_limits(1)
 
 
+SLOW_CASES = Path(__file__).with_name("slow_cases.txt")
+
+
+def slow_cases() -> set[str]:
+    """Node ids, from the folder of the tests, of `slow_cases.txt`."""
+    found, test = set[str](), ""
+    for line in SLOW_CASES.read_text(encoding="utf-8").splitlines():
+        if line.startswith("  "):
+            found.add(f"{test}[{line[2:]}]")
+        elif not line.startswith("#"):
+            test = line
+    return found
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Mark the slow cases. Raises UsageError where the tests are collected as a whole and one is not among them."""
+    missing = slow_cases()
+    for item in items:
+        name = item.nodeid.removeprefix("tests/")
+        if name in missing:
+            missing.remove(name)
+            item.add_marker(pytest.mark.slow)
+    if missing and config.args in (["tests"], [str(config.rootpath / "tests")]):
+        raise pytest.UsageError(f"{SLOW_CASES.name} names cases that are gone: {', '.join(sorted(missing))}")
+
+
 @pytest.fixture(autouse=True)
 def signals_are_handled_as_before():
     """A command that is interrupted in this process ignores what else asks it to end; other tests want to be asked."""

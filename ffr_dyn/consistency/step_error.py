@@ -45,7 +45,7 @@ from ffr_dyn.functions.operations import ACOS, ASIN, POWER, SQRT
 from ffr_dyn.functions.time_functions import OPERATION
 from ffr_dyn.kernels.functions import ROUNDING as OF_TIME
 from ffr_dyn.kernels.functions import evaluate_functions
-from ffr_dyn.kernels.tables import SINCE
+from ffr_dyn.kernels.tables import SINCE, Functions
 from ffr_dyn.results.result import Result
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.units import natural
@@ -69,6 +69,7 @@ RATES = {"position": "velocity", "R": "v", "q": "q_dot"}
 CONSTANT = 1e-7  # of the size of a kind: a range below it is rounding, as of the rate of an even turn
 ROUNDING = 1e-10  # of what a scene's mass, length and speed make of a unit
 A_FORMULA = "a formula"
+FOUND = 2.0**-17  # of the time between rows, up to where a break that was found may be
 SHARP = {SQRT, POWER, ASIN, ACOS}  # operations that are where their operand turns back at the end of its range
 AT_ONCE = 2e7  # bytes of numbers that are compared side by side
 COARSE = 0.01  # of the range, by which a row may be off the curve through its neighbours
@@ -150,28 +151,41 @@ def untold_breaks(system: System, times: Array, found_before: Sequence[float] = 
 
     Steps do not end there. They are Python functions, and formulas that are sharp where a root or an angle ends.
     """
-    functions = system.model.functions
-    told = np.concatenate([functions.breaks[:, SINCE], found_before])
-    found: dict[str, list[float]] = {}
+    functions, found = system.model.functions, dict[str, list[float]]()
+    values = np.zeros((functions.kind.size, 3))
+
+    def at(t: float) -> Array:
+        evaluate_functions(functions, np.zeros(system.user.count), t, values)
+        return values
+
+    def formula(t: float, row: int) -> Array:
+        return np.array([at(t)[row, 0], 0.0, 0.0])  # derivatives are not numbers where it is sharp
+
     for callback in system.user.callbacks:
         if not callback.with_state:
             found[callback.what] = hidden_breaks(partial(_three, callback.function), times)
-    sharp = [
-        k
-        for k, (kind, first) in enumerate(zip(functions.kind, functions.start, strict=False))
-        if kind == OPERATION and functions.data[first] in SHARP
-    ]
-    values = np.zeros((functions.kind.size, 3))
-
-    def formula(t: float, row: int) -> Array:
-        evaluate_functions(functions, np.zeros(system.user.count), t, values)
-        return np.array([values[row, 0], 0.0, 0.0])  # derivatives are not numbers where it is sharp
-
-    if sharp:
+    if sharp := _sharp(functions):
         found[A_FORMULA] = [t for row in sharp for t in hidden_breaks(partial(formula, row=row), times)]
-    least = 1e3 * OF_TIME * np.abs(times).max()
-    known = {what: [t for t in at if not (np.abs(told - t) <= least).any()] for what, at in found.items()}
-    return {what: at for what, at in known.items() if at}
+    told = np.concatenate([functions.breaks[:, SINCE], found_before])
+    known = {what: [t for t in those if not _ended(functions, told, at, t, times)] for what, those in found.items()}
+    return {what: those for what, those in known.items() if those}
+
+
+def _sharp(functions: Functions) -> list[int]:
+    """The rows of formulas that are sharp where their operand turns back: powers but those of natural numbers."""
+    operations = [k for k, kind in enumerate(functions.kind.tolist()) if kind == OPERATION]
+    codes = {k: functions.data[functions.start[k] : functions.start[k] + 2].tolist() for k in operations}
+    smooth = {k for k, (op, exponent) in codes.items() if op == POWER and exponent > 0 and exponent % 1 == 0}
+    return [k for k, (op, _) in codes.items() if op in SHARP and k not in smooth]
+
+
+def _ended(functions: Functions, told: Array, at: Callable[[float], Array], t: float, times: Array) -> bool:
+    """Whether a step ends at a break that was found: at one that is told, or where an operation of a formula switches."""
+    near = FOUND * np.diff(times).max() + 1e3 * OF_TIME * np.abs(times).max()
+    first, second = functions.switches.T
+    before, behind = (np.append(at(t + side)[:, 0], 0.0) for side in (-near, near))  # row -1 is none
+    switched = (before[first] >= before[second]) != (behind[first] >= behind[second])
+    return bool((np.abs(told - t) <= near).any() or switched.any())
 
 
 def _three(function: Callable[[float], Any], t: float) -> Array:

@@ -46,6 +46,7 @@ def typed(commands):
     return [re.sub(r" +#.*", "", one, count=1).strip() for one in found]
 
 
+@pytest.mark.slow
 def test_the_commands(folder, monkeypatch, capsys):
     assert 8 < len(typed(COMMANDS)) <= 12
     for command in typed(COMMANDS):
@@ -67,6 +68,7 @@ def test_the_commands(folder, monkeypatch, capsys):
     assert_swings(result)
 
 
+@pytest.mark.slow
 def test_the_program(folder):
     assert len([line for line in PROGRAM.splitlines() if line.strip()]) <= 25
     space: dict = {}

@@ -80,6 +80,7 @@ def run(monkeypatch, *arguments: str) -> int:
     return 0
 
 
+@pytest.mark.slow
 def test_the_command(tmp_path, monkeypatch, capsys):
     assert set(SHORT) <= set(EXHIBITS)
     assert run(monkeypatch, "index3-conditioning", "--quick", "-o", tmp_path) == 0

@@ -63,6 +63,7 @@ def test_runs_tell_how_far_they_are(cells):
     assert "pendulum: 100 %" in shown(cells, "fd.progress")[1]
 
 
+@pytest.mark.slow
 def test_a_part_shows_its_faces_an_error_bar_and_its_stress():
     cells = run(ROOT / "examples" / "part.ipynb")
     assert "bore r 6, axis (0, 0, 1), centre (45, 25, 5) mm" in shown(cells, "fp.faces")[0]["text/html"]
@@ -72,6 +73,7 @@ def test_a_part_shows_its_faces_an_error_bar_and_its_stress():
     assert shown(cells, "fd.animate")[0]["text/html"].startswith("<iframe srcdoc=")
 
 
+@pytest.mark.slow
 def test_a_rotor_shows_its_diagram_and_a_whirl():
     cells = run(ROOT / "examples" / "rotor.ipynb")
     assert "image/png" in shown(cells, "fd.campbell")[0]

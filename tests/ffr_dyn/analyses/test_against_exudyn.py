@@ -13,6 +13,7 @@ AGREEMENT = 1e-6  # m
 KINDS = ("rigid", "mean")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("make", [pendulum_rod, connecting_rod])
 def test_mass_terms_from_the_mesh_are_equal(make, kind):
@@ -21,6 +22,7 @@ def test_mass_terms_from_the_mesh_are_equal(make, kind):
     assert max(found.values()) < 1e-12, found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_pendulum_over_half_a_second(kind):
     case = compared.pendulum_case(kind, (4e-5,))

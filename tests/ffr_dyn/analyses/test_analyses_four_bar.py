@@ -94,6 +94,7 @@ def test_the_torque_comes_back_as_the_multiplier_of_the_known_angle(run):
     np.testing.assert_allclose(back["pivot.force"], run["pivot.force"], rtol=0, atol=1e-5)
 
 
+@pytest.mark.slow
 def test_the_torque_comes_back_as_a_servo_force(run):
     """The same by integration of the internal dynamics, another method with another step: to 2e-8 N m."""
     back = mixed(known(run), unknown=(MOTOR,), end=END, output_step=0.02, solution=Causal())

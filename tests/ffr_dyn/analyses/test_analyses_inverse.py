@@ -170,6 +170,7 @@ def test_quasi_static_deformation_needs_joints_that_rigid_bodies_can_meet():
         inverse(scene, end=0.1, output_step=0.05, elastic=QuasiStatic())
 
 
+@pytest.mark.slow
 def test_a_force_that_no_deformation_balances_is_refused():
     """It pushes the first mode up below a deformation and down above it: at the deformation itself it jumps."""
     up = np.sign(flexible_arm().bodies[1].model.interface("b").phi_t[0, 0])

@@ -69,6 +69,7 @@ def test_slider_crank_in_closed_form():
     assert result["constraint.position"].max() < 1e-10
 
 
+@pytest.mark.slow
 def test_efforts_do_the_work_that_becomes_energy():
     result = kinematic(slider_crank(0.2, 0.7, MOTOR), end=1.0, output_step=0.001)
     work = np.concatenate([[0], np.cumsum(0.5e-3 * (result["motor.power"][1:] + result["motor.power"][:-1]))])

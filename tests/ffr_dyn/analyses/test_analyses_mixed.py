@@ -137,6 +137,7 @@ def test_the_chain_with_a_flexible_body():
     assert np.abs(run["b3.tip.displacement"]).max() > 1e-3
 
 
+@pytest.mark.slow
 def test_forces_away_from_the_known_motion(antonya):
     """The angle at A known, the force on body 5 unknown: a servo constraint with one internal coordinate."""
     scene = chain(
@@ -227,6 +228,7 @@ def test_hub_angle_known_is_causal():
 TIP = PointDriver("path", "ground.O", "arm.tip", y=rest_to_rest(0.4, 0.6))
 
 
+@pytest.mark.slow
 def test_tip_path_known_needs_the_moment_before_the_motion():
     """Stable inversion of the non-minimum-phase arm; the moment found reproduces the path to 1e-6 of its range."""
     found = mixed(one_link(TIP), unknown=(MOTOR,), end=0.6, output_step=5e-3)
@@ -248,6 +250,7 @@ def test_tip_path_known_needs_the_moment_before_the_motion():
     np.testing.assert_allclose(run["arm.tip.position.y"], found["arm.tip.position.y"], atol=4e-7)
 
 
+@pytest.mark.slow
 def test_an_arm_that_bends_too_far_is_told():
     path = replace(TIP, y=rest_to_rest(0.8, 0.3))
     notes = mixed(one_link(path), unknown=(MOTOR,), end=0.3, output_step=5e-3).attributes["notes"]
@@ -333,6 +336,7 @@ ARMS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("arm", ARMS)
 def test_tip_paths_of_craig_bampton_arms(arm):
     """The moment found, fed to a forward run, moves the tip on its path to 1e-6 of the range; and what is done is told."""
@@ -346,6 +350,7 @@ def test_tip_paths_of_craig_bampton_arms(arm):
     np.testing.assert_allclose(run["arm.tip.position.y"], found["arm.tip.position.y"], atol=4e-7)
 
 
+@pytest.mark.slow
 def test_a_motor_behind_a_spring_moves_a_tip():
     """No moment changes the acceleration of the tip at once, nor its next derivative: relative degree four."""
     arm = craig_bampton(fp.FixedTo("root"), 1)
@@ -461,6 +466,7 @@ def test_a_motion_without_coordinates_is_refused():
         mixed(hung, unknown=(MarkerEffort("p", "two.c", (1, 0, 0)),), end=1.0, output_step=0.1)
 
 
+@pytest.mark.slow
 def test_work_of_the_unknown_force_is_the_change_of_energy():
     """The tip path again: what the motor does becomes kinetic and strain energy, but for the modal damping."""
     scene = one_link(TIP)

@@ -63,6 +63,7 @@ def test_every_example_with_a_motion_is_here():
     }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SCENES)
 def test_work_is_the_change_of_energy(name, tmp_path):
     """At the example's own step, and at the second order of ROS2 with half of it."""

@@ -28,6 +28,7 @@ def rotor() -> fd.Scene:
     return fd.Scene(bodies, [hub], forces=bearings, ground=at)
 
 
+@pytest.mark.slow
 def test_how_far_a_whirl_is_from_the_speed_is_smooth_where_it_stands_still():
     """In the turning axes its eigenvalue is real there, by rounding, and says nothing of how fast it is seen."""
     at, off = _at_speeds(rotor(), "", 0.0), _off_order(True, 1.0)
@@ -111,6 +112,7 @@ def test_a_flat_shaft_is_unstable_between_its_critical_speeds(speeds):
     assert backward == pytest.approx(sign * whirl, rel=1e-7)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("speeds", [(0, 100, 200, 300), (-300, -200, -100, 0)])
 def test_damping_within_the_shaft_is_unstable_from_the_same_speed_in_either_direction(speeds):
     """The critical speed times one plus outer over inner damping."""
@@ -125,6 +127,7 @@ def test_an_undamped_rotor_is_not_unstable_by_rounding_where_it_stands_still(sti
     assert not fd.steady(jeffcott((1e4, 1.21e4)), speeds=(105.0,)).attributes["stable"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ratio", [3.0, -3.0])
 def test_a_rotor_that_is_geared_to_a_faster_one_has_its_own_critical_speed(ratio):
     slow = jeffcott((1e4, 1e4), name="A")

@@ -140,6 +140,7 @@ def test_what_has_a_source_goes_on(what):
     assert result.time[-1] == pytest.approx(2.0)
 
 
+@pytest.mark.slow
 def test_what_rows_do_not_explain_is_looked_into(monkeypatch):
     """Without which such runs would show nothing."""
     looked: list[float] = []

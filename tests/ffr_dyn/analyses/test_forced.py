@@ -118,6 +118,7 @@ def test_small_vibrations_are_those_of_the_linear_response(given):
     np.testing.assert_allclose(H, wanted["transfer"] @ [1, 1j], rtol=2e-4)
 
 
+@pytest.mark.slow
 def test_a_driver_shakes():
     """A pendulum on a slide: small angles against the linear response, downwards."""
     slide = fd.rigid_body("slide", mass=1.0, inertia=(1, 1, 1), points={"c": (0, 0, 0)})
@@ -147,6 +148,7 @@ def test_a_driver_shakes():
     np.testing.assert_allclose(found["harmonics"][:, 0, 0], 1e-4 * wanted["gain"][:, 0], rtol=2e-4)
 
 
+@pytest.mark.slow
 def test_the_command_draws_and_a_file_holds_it(tmp_path):
     spring = '[forces.s]\nkind = "joint-spring"\njoint = "hinge"\nstiffness = 30\ndamping = 2\n'
     file, picture = tmp_path / "rod.toml", tmp_path / "out" / "forced.png"

@@ -71,6 +71,7 @@ def command(*words: object) -> str:
     return done.output
 
 
+@pytest.mark.slow
 def test_a_method_of_ones_own_runs_from_a_file_a_command_and_python(write, tmp_path):
     file = write(METHOD, 'method = "symplectic-euler"\nend = 0.2\noutput_step = 0.02\nstep = 1e-4')
     scene, settings = fd.load_scene(file)

@@ -51,6 +51,7 @@ def test_critical_speeds_and_whirls_of_a_jeffcott_rotor(tmp_path):
     assert fd.draw_campbell(found, tmp_path / "campbell.svg").stat().st_size > 1000
 
 
+@pytest.mark.slow
 def test_the_picture_of_a_campbell_diagram_tells_what_is_what(tmp_path):
     """Names of vibrations at the ends of their lines, orders, critical speeds and limits with their numbers."""
     done = []
@@ -69,6 +70,7 @@ def test_the_picture_of_a_campbell_diagram_tells_what_is_what(tmp_path):
     assert len(critical) >= 4
 
 
+@pytest.mark.slow
 def test_damping_inside_is_unstable_above_a_limit():
     """speed < sqrt(k/m) (1 + c_external / c_internal)."""
     found = fd.campbell(jeffcott(0.4, 0.2), speeds=(5.0, 26.0, 47.0), modes=2)
@@ -84,6 +86,7 @@ def test_damping_inside_is_unstable_above_a_limit():
     assert "forward grows by" in note
 
 
+@pytest.mark.slow
 def test_what_only_decays_is_no_slow_vibration():
     """Tilting that is damped away has no frequency but that of the turning: it hides neither critical speeds nor limits."""
     scene = jeffcott(0.4, 0.2)
@@ -148,6 +151,7 @@ def test_the_response_of_a_clamped_beam_and_its_parts():
     assert found.attributes["outputs"][1:] == [f"rod.b.acceleration.{c}" for c in "xyz"]
 
 
+@pytest.mark.slow
 def test_a_response_is_that_of_the_full_model_as_the_report_promises():
     """Of a clamped beam: relative, as in the report, to the sum of all modal parts without regard to their phase."""
     band, beta = fp.Band(20.0, 2000.0), 1e-6

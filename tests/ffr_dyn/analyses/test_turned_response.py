@@ -24,6 +24,7 @@ def receptance(at: float, seen: tuple[float, ...], stiff: tuple[float, float] = 
     return np.array([np.linalg.solve(K + one**2 * M + one * C, (1, 0, 0, at)) @ np.array(seen) for one in s])
 
 
+@pytest.mark.slow
 def test_a_force_that_does_not_turn_with_the_rotor_excites_whirls_seen_from_the_ground():
     outputs = ["disc.right.position.x", "disc.left.acceleration.y"]
     how = {"input": "disc.right.force.x", "about": "steady", "frequencies": F}
@@ -36,6 +37,7 @@ def test_a_force_that_does_not_turn_with_the_rotor_excites_whirls_seen_from_the_
     np.testing.assert_allclose(found["parts"].sum(axis=2)[:, 0], found["transfer"][:, 0], rtol=1e-6)
 
 
+@pytest.mark.slow
 def test_the_ground_that_shakes_carries_along_what_turns():
     found = fd.response(
         rotor(SPEED, DAMPING),
@@ -47,6 +49,7 @@ def test_the_ground_that_shakes_carries_along_what_turns():
     assert found["gain"][0, 0] == pytest.approx(1.0, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_what_is_seen_in_turning_axes_has_other_frequencies_which_is_told():
     scene = rotor(SPEED, DAMPING)
     found = fd.response(scene, input="disc.right.force.x", outputs=["disc.omega_bar.x"], about="steady", frequencies=F)
@@ -57,6 +60,7 @@ def test_what_is_seen_in_turning_axes_has_other_frequencies_which_is_told():
     assert note.endswith("not at its own")
 
 
+@pytest.mark.slow
 def test_the_rms_of_what_turns_is_that_of_all_frequencies_at_which_it_answers():
     """A force along x at the middle of a rotor that does not tilt: of what is seen along an axis of the rotor the rms is
     that along x over the root of two, as it is along x half of the time and across it the other half."""
@@ -95,6 +99,7 @@ def spun(speed: float) -> fd.Scene:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("speed", [60.0, -60.0])
 def test_what_a_motor_shakes_is_seen_from_the_ground_at_other_frequencies(speed):
     """The disc follows the angle of the motor by T; a point of its rim moves along y by r cos(W t) T, half of the time."""
@@ -128,6 +133,7 @@ def test_matrices_of_one_moment_of_a_turn_say_so():
     assert not any("of this moment" in note for note in still.notes)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("flat", "support", "speed"), [((1.2e4, 0.8e4), (0, 0), 40), ((1.6e4, 0.4e4), (0, 2e4), 60)])
 def test_a_flat_shaft_in_supports_that_are_not_alike_answers_by_all_harmonics(flat, support, speed):
     """Against the equations in axes at rest, whose stiffness has a second harmonic, with twenty-five of the motion."""

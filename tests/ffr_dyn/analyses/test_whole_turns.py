@@ -134,6 +134,7 @@ def given(time: np.ndarray, order: int) -> np.ndarray:
     return np.where((time > 0) & (time < 0.6), PATH.deriv(order)(time) if order else PATH(time), rest)
 
 
+@pytest.mark.slow
 def test_springs_of_many_turns_in_a_causal_inversion():
     """The angle of the first wheel known, the moment between both unknown: what acts on the second turns it without end."""
     found = mixed(

@@ -408,6 +408,7 @@ def test_pictures_show_something(small, tmp_path, against):
     assert text.count("<svg") == 1
 
 
+@pytest.mark.slow
 def test_the_same_diagram_gives_the_same_bytes(diagram, small, tmp_path):
     for suffix in (".png", ".svg"):
         once, again = (draw_chart(small, tmp_path / f"{k}{suffix}").read_bytes() for k in (1, 2))
@@ -478,6 +479,7 @@ def run(*arguments: object):
     return CliRunner().invoke(cli, ["chart", *map(str, arguments)])
 
 
+@pytest.mark.slow
 def test_the_command_writes_pictures_page_and_table(scene_file, tmp_path):
     done = run(
         scene_file, "-m", "position:rod.b", "--method", "ros2=0.0125,0.00625", "--method", "rk4=0.00625", "--modes", "2,all",
@@ -506,6 +508,7 @@ def compared(table) -> tuple[set[str], set[str], list[str]]:
     return {row["model"] for row in rows}, {f"{row['method']} {float(row['number'])}" for row in rows}, measured
 
 
+@pytest.mark.slow
 def test_a_scene_file_says_what_its_chart_compares(scene_file, tmp_path):
     scene_file.write_text(scene_file.read_text() + CHART)
     done = run(scene_file, "--workers", 0, "--repeats", 1, "-o", tmp_path / "c")
@@ -516,6 +519,7 @@ def test_a_scene_file_says_what_its_chart_compares(scene_file, tmp_path):
     assert measured == ["relative error of position:rod.b"]
 
 
+@pytest.mark.slow
 def test_options_go_before_the_chart_of_the_file(scene_file, tmp_path):
     scene_file.write_text(scene_file.read_text() + CHART)
     options = ("-m", "deflection:rod", "--method", "ros2=0.0125", "--modes", "all", "--drop", "I8")
@@ -551,6 +555,7 @@ def test_only_forward_dynamics_is_charted(scene_file):
         load_scene(scene_file)
 
 
+@pytest.mark.slow
 def test_another_body_file_is_a_model(scene_file, tmp_path):
     other = next(tmp_path.glob("swing.rod.ffr"))
     finer = shutil.copy(other, tmp_path / "finer.ffr")
@@ -592,6 +597,7 @@ def test_bad_input_is_refused_in_a_sentence(scene_file, arguments, message):
     assert message in str(done.exception)
 
 
+@pytest.mark.slow
 def test_the_example_of_the_documentation_runs(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     text = (ROOT / "docs" / "chart.md").read_text(encoding="utf-8")

@@ -86,6 +86,7 @@ def test_the_command_is_told(folder, capsys):
     assert load_body("strip.ffr").parts == ()
 
 
+@pytest.mark.slow
 def test_bodies_are_reduced_again_until_it_is_enough(folder, capsys):
     run(ffr_dyn, "parts", "scene.toml", "--static", "--reduce")
     assert "body         strip: 5 parts do" in capsys.readouterr().out
@@ -105,6 +106,7 @@ def test_bodies_that_do_not_know_their_command_are_told(folder, capsys):
         run(ffr_dyn, "parts", "scene.toml", "--reduce")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("share", "expected"), [(1.0, 5), (3.0, 11)], ids=["a third", "six tenths"])
 def test_enough_at_once(tmp_path, share, expected):
     """A cantilever bent to 0.30 and to 0.60 of its length: the parts that one body asks for ask for no more."""

@@ -60,6 +60,7 @@ def test_the_reactions_of_a_free_locomotive_are_those_of_the_row_before_and_afte
         np.testing.assert_allclose(rows[2], between, rtol=0, atol=1e-3 * np.abs(rows).max() + 1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("plane", ["auto", "none"])
 def test_a_motion_that_begins_at_rest_in_a_singular_position_has_limits(plane):
     """Gravity sets free cranks in a row in motion; a driver does so, against forces along them that grow without bound."""

@@ -185,6 +185,7 @@ def test_no_scene_changes_a_bit_of_another_that_follows(alone, seed):
         assert digest(SCENES[name]()) == alone[name], f"{name} after {order[: order.index(name)]}"
 
 
+@pytest.mark.slow
 def test_a_new_process_gives_the_same_bits(tmp_path):
     """A scene first in its process, and after others of its structure with other numbers."""
     save_body(LINK, tmp_path / "link.ffr")

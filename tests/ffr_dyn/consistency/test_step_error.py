@@ -232,12 +232,14 @@ def test_breaks_that_nobody_tells_are_those_of_python_functions_and_of_sharp_for
         scene = Scene((Body("m", slider),), (rail,), loads=(load,), ground={"O": (0, 0, 0)})
         return untold_breaks(compile_scene(scene), np.linspace(0.0, 1.0, 101))
 
-    for told in ("sign(t - 0.3)", "min(t, 0.3)", "sqrt(t + 1)", "smooth(t / 0.3)"):
+    smooth = ("sqrt(t + 1)", "smooth(t / 0.3)", "(t - 0.3) ** 3", "(t - 0.3) ** 2 - t ** 4")
+    ended = ("sign(t - 0.3)", "min(t, 0.3)", "min(t, 0.3) ** 2", "sqrt(1 + min(t, 0.3))", "sqrt(abs(t - 0.3))")
+    for told in (*smooth, *ended):
         assert not found(formula(told))
     assert not found(piecewise([0.0, 0.5, 1.0], [[0.0, 1.0], [0.5, 0.0]]))
     assert not found(user(lambda t: float(t >= 0.3), breaks=[0.3]))
     assert found(user(lambda t: float(t >= 0.3)))["load 'push'"] == pytest.approx([0.3])
-    assert found(formula("sqrt((t - 0.3) ** 2)"))[A_FORMULA] == pytest.approx([0.3], abs=1e-6)
+    assert found(formula("sqrt((t - 0.3) ** 2) + min(t, 0.6) ** 2"))[A_FORMULA] == pytest.approx([0.3], abs=1e-6)
 
 
 def test_exponential_growth_from_rounding_is_no_motion_that_sets_in():

@@ -60,6 +60,7 @@ def test_the_energy_of_a_negative_spring_is_energy():
     np.testing.assert_allclose(result["guide.stroke"][-1], 1e-6 * np.cosh(20.0), rtol=1e-3)
 
 
+@pytest.mark.slow
 def test_statics_tells_a_force_that_jumps_from_a_motion_that_nothing_holds():
     spring = fd.JointSpring("spring", "guide", stiffness=100.0, coordinate="stroke")
     jumping = fd.Load("load", "block.a", function=lambda t, s: (10.0 * np.sign(0.05 - s.position("block.a")[0]), 0, 0))

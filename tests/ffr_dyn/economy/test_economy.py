@@ -138,6 +138,7 @@ def test_the_estimate_of_a_rigid_pendulum_is_right_whatever_its_frame(reference)
     assert (estimated < 2.5 * true).all()
 
 
+@pytest.mark.slow
 def test_modes_have_a_rank_and_principal_shapes_need_fewer():
     """A rod that speeds up: bending first; two shapes hold what takes more modes."""
     scene = slider_crank(150.0)
@@ -689,6 +690,7 @@ def test_a_body_that_does_nothing_to_the_outputs_itself_is_found_where_more_mode
     assert fine.kept.effect[crank].max() < 1e-6 * fine.limits[0]
 
 
+@pytest.mark.slow
 def test_the_command_writes_a_scene_that_runs(tmp_path):
     scene = slider_crank(50.0)
     settings = Settings(start=0.0, end=0.1, output_step=0.005, method=ROS2(0.0005), stabilisation=Projection())
@@ -706,6 +708,7 @@ def test_the_command_writes_a_scene_that_runs(tmp_path):
     assert off < 1e-4 * np.ptp(reference["slider.pin.position.x"])
 
 
+@pytest.mark.slow
 def test_the_command_keeps_parameters_and_events(tmp_path):
     """In the scene that it writes: a parameter may be changed there, and an event ends the run as before."""
     scene = slider_crank(50.0)
@@ -732,6 +735,7 @@ def test_the_command_keeps_parameters_and_events(tmp_path):
     assert how.end == 0.1
 
 
+@pytest.mark.slow
 def test_parameters_that_no_longer_act_as_they_did_are_left_out(tmp_path):
     """The damping of a body is that of the modes of its model now; what stands with its parameter goes with it."""
     scene = slider_crank(50.0)

@@ -97,6 +97,7 @@ def test_andrews_squeezer(kind):
         assert abs(run[f"{name}.angle"][-1] - expected) < 2e-4, name
 
 
+@pytest.mark.slow
 def test_a_jump_is_passed_with_small_steps_and_a_pole_is_not():
     jump = Load("jump", "bar.b", (0.0, lambda t: 50.0 * (t > 0.31), 0.0))
     run = integrate(

@@ -145,6 +145,7 @@ def slider_crank(rod: FlexibleBody) -> Scene:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["rigid", "mean"])
 def test_flexible_slider_crank(kind):
     """Against the linear floating-frame beam in the chord frame: mid-rod deflection within 5 % of its peak."""

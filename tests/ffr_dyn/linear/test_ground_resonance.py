@@ -70,6 +70,7 @@ def coleman(k, c, lag, speed):
     return np.linalg.eigvals(np.block([[none, one], [-np.linalg.solve(M, K), -np.linalg.solve(M, C)]]))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("support", SUPPORTS)
 def test_floquets_multipliers_are_those_of_coleman(support):
     """Of which one grows where a lagging blade's slow whirl meets a vibration of the hub, and none grows below."""
@@ -82,6 +83,7 @@ def test_floquets_multipliers_are_those_of_coleman(support):
     assert found.attributes["exponents"][0][0] == pytest.approx(exact.real.max(), abs=1e-6)
 
 
+@pytest.mark.slow
 def test_a_stiff_bushing_as_the_bearing_has_a_steady_motion():
     """The joint lets hub and fuselage move aside together, which the error says."""
     support = SUPPORTS[1]

@@ -57,6 +57,7 @@ def test_along_the_axis_nothing_is_added_to_a_frequency():
     assert axial == pytest.approx(np.sqrt(AXIAL / MASS) / (2 * np.pi), rel=1e-9)
 
 
+@pytest.mark.slow
 def test_critical_speeds_in_unlike_bearings():
     """Where the speed is one of the eigenvalues in axes at rest; followed through rest, where the axes coincide."""
     found = fd.campbell(rotor(1.0), speeds=np.linspace(0.0, 700.0, 15))
@@ -67,6 +68,7 @@ def test_critical_speeds_in_unlike_bearings():
     assert (np.abs(np.diff(np.abs(found["seen"]), axis=0)) < 20).all()
 
 
+@pytest.mark.slow
 def test_a_rotor_unlike_itself_in_unlike_bearings_has_floquets_exponents():
     """Of the compiled loop, over a turn."""
     speed = 300.0

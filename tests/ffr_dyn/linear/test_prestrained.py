@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
+import pytest
 
 import ffr_dyn as fd
 import ffr_prep as fp
@@ -36,6 +37,7 @@ def doubts(scene: fd.Scene) -> list[str]:
     return [note for note in notes if "beyond second order" in note]
 
 
+@pytest.mark.slow
 def test_what_is_missing_of_a_frequency_is_told_where_it_is_much():
     assert doubts(turning(20.0)) == []
     (note,) = doubts(turning(78.5))

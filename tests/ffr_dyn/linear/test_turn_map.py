@@ -86,6 +86,7 @@ def test_modes_about_a_periodic_motion_of_constant_coefficients():
     assert found.attributes["leading"] == ["rail.stroke"] * 2
 
 
+@pytest.mark.slow
 def test_modes_about_the_turn_of_an_engine_are_those_of_its_rod():
     """A crank that turns slowly: the vibration of the rod, damped as it is."""
     scene = flexible_crank(loads=())
@@ -98,6 +99,7 @@ def test_modes_about_the_turn_of_an_engine_are_those_of_its_rod():
     assert all(name.startswith("rod: ") for name in lasting)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("damping", "turns"), [(0.1, 20), (0.01, 60)])
 def test_deflections_come_back_to_a_hundred_millionth_of_themselves(damping, turns):
     """Of a turn of a long run: also where vibrations last for many turns, and where they are small beside the scene."""
@@ -141,6 +143,7 @@ def test_the_error_of_the_steps_is_told_of_every_output(case):
     assert found.attributes["accuracy"].startswith(f"step: within {float(f'{100 * worst:.2g}'):g} % of the range of ")
 
 
+@pytest.mark.slow
 def test_the_error_of_multipliers_is_told():
     """Steps that are too long damp the vibration of the rod."""
     scene = flexible_crank(loads=())
@@ -164,6 +167,7 @@ def test_rows_reach_the_end_of_the_period(steps):
     assert found["m.R.x"][-1] == pytest.approx(found["m.R.x"][0], abs=1e-11)
 
 
+@pytest.mark.slow
 def test_a_period_that_is_none_is_an_error():
     with pytest.raises(fd.InputError, match="the period is not known"):
         fd.periodic(oscillator())

@@ -114,6 +114,7 @@ def test_the_legend_lies_beside_the_curves(result, figures, tmp_path):
         assert axes.get_legend().get_window_extent().x1 <= figures[0].bbox.x1
 
 
+@pytest.mark.slow
 def test_many_curves_differ_in_colour_or_style(figures, tmp_path):
     many = Result(T, {f"body_{k}.x": Quantity(k + T, "m") for k in range(3 * len(PALETTE))})
     plot(many, list(many.quantities), tmp_path / "a.png")

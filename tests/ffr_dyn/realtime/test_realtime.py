@@ -110,6 +110,7 @@ def run(monkeypatch, *arguments: str) -> int:
     return 0
 
 
+@pytest.mark.slow
 def test_the_command(tmp_path, monkeypatch, capsys):
     scene, picture = tmp_path / "scene.toml", tmp_path / "steps.png"
     scene.write_text(SCENE, encoding="utf-8")

@@ -93,6 +93,7 @@ def test_a_stopped_run_keeps_what_it_has_and_goes_on(scene, tmp_path, monkeypatc
         assert_goes_on(scene, output, monkeypatch)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("limit", "kept"), [(100_000, False), (1_000_000, True)])
 def test_a_full_disk_ends_a_run_in_order(scene, tmp_path, monkeypatch, limit, kept):
     output = tmp_path / "x.nc"

@@ -213,6 +213,7 @@ def test_work_of_a_cubic_power_is_exact_after_two_steps():
     assert np.concatenate([first, rest]).tobytes() == total.tobytes()
 
 
+@pytest.mark.slow
 def test_work_does_not_change_the_motion(run):
     plain = forward(SCENE, end=0.3, output_step=1e-3, method=RK4(2.5e-4))
     assert all(quantity.values.tobytes() == run[name].tobytes() for name, quantity in plain.quantities.items())

@@ -105,6 +105,7 @@ def test_units_and_mistakes_are_those_of_the_declaration(folder):
         load_scene(wrong)
 
 
+@pytest.mark.slow
 def test_its_kernel_equals_its_law(scene):
     system, place = compile_scene(scene), layout(scene)
     x, v = initial_state(scene, place)
@@ -143,6 +144,7 @@ def test_equilibrium_and_small_vibration_have_their_closed_forms(scene):
     assert found.frequencies.max() == pytest.approx(np.sqrt(3 * STIFFNESS * stretch**2 / MASS) / (2 * np.pi), rel=1e-6)
 
 
+@pytest.mark.slow
 def test_the_command_runs_it_when_it_is_told_of_the_module(folder):
     def run(*arguments: str) -> subprocess.CompletedProcess[str]:
         command = [sys.executable, "-m", "ffr_dyn.cli", *arguments]

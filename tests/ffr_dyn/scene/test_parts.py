@@ -206,6 +206,7 @@ def run(model: FlexibleBody) -> Result:
     return integrate(scene, end=0.02, output_step=0.005, method=ROS2(1e-4))
 
 
+@pytest.mark.slow
 def test_a_result_speaks_of_one_body(tmp_path):
     one, two = run(bar(None)), load_result(save_result(run(bar(2)), tmp_path / "run.nc"))
     assert two.attributes["parts"] == {"beam": ["beam_1", "beam_2"]}

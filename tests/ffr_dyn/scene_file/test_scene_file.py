@@ -206,6 +206,7 @@ def test_points_may_be_driven_and_joints_coupled(tmp_path):
     assert scene.measurements == (Measurement("gap", "ground.O", "bar.b", "distance"),)
 
 
+@pytest.mark.slow
 def test_a_force_may_be_a_formula_of_the_motion(tmp_path):
     """A spring to the ground by formula moves the bar as the spring does."""
     spring, _ = load_scene(written(tmp_path, changed("10 * smooth(t / 0.05) * bar.length", "0")))

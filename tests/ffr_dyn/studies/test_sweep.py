@@ -90,6 +90,7 @@ def test_the_file_has_dimensions_and_coordinates(folder):
         assert file["force"].attrs["coordinates"] == "g length"
 
 
+@pytest.mark.slow
 def test_whole_histories_are_rows_of_a_dimension_of_their_own(folder):
     """Of runs of unequal length, too; the table is the same when it is made by workers."""
     parameters = {"g": [1.0, 9.81], "analysis.end": [0.1, 0.2], "bodies.bar.mass": [1.0]}
@@ -178,6 +179,7 @@ def test_workers_make_the_same_file(folder):
     assert (folder / "t.nc").read_bytes() == (folder / "whole.nc").read_bytes()
 
 
+@pytest.mark.slow
 def test_a_dask_cluster_makes_the_same_file(folder):
     distributed = pytest.importorskip("dask.distributed")
     fd.sweep(folder / "study.toml", folder / "whole.nc", workers=0)
@@ -345,6 +347,7 @@ def test_the_journal_of_another_study_is_refused(folder):
         fd.sweep(other, folder / "t.nc", workers=0)
 
 
+@pytest.mark.slow
 def test_units_are_those_of_the_runs_and_of_the_scene(folder, monkeypatch):
     """In the table, in its file, and on the axes of its pictures; a formula of outputs has none."""
     (folder / "bar.toml").write_text(SCENE.replace("length = 1.0", 'length = "100 cm"'))
@@ -371,6 +374,7 @@ def test_units_are_those_of_the_runs_and_of_the_scene(folder, monkeypatch):
     ]
 
 
+@pytest.mark.slow
 def test_pictures_are_drawn(folder):
     table = fd.sweep(folder / "study.toml", folder / "t.nc", workers=0)
     names = {path.name for path in fd.plot_study(table, folder / "p", ["force"])}

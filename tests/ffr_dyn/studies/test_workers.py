@@ -34,6 +34,7 @@ def test_tasks_are_done_by_other_processes():
         assert os.getpid() not in {found for _, found in workers.results(eval, ["__import__('os').getpid()"] * 3)}
 
 
+@pytest.mark.slow
 def test_a_worker_that_died_is_replaced():
     with crew(1) as workers:
         number = next(workers.results(eval, ["__import__('os').getpid()"]))[1]
@@ -44,6 +45,7 @@ def test_a_worker_that_died_is_replaced():
         assert list(workers.results(abs, [-5])) == [(0, 5)]
 
 
+@pytest.mark.slow
 def test_what_nobody_waits_for_ends():
     def stop(number, frame):
         raise KeyboardInterrupt
@@ -60,6 +62,7 @@ def test_what_nobody_waits_for_ends():
         signal.signal(signal.SIGALRM, before)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="looks at /proc")
 def test_workers_end_with_the_study_that_is_killed(tmp_path):
     code = (

@@ -174,6 +174,7 @@ def drawn_aside(height: float, stiffening: bool, **changes) -> Scene:
     return slider_crank(bodies=bodies, ground={"O": up, "P": (1.0, 0, height)}, **changes)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stiffening", [False, True])
 def test_a_plane_may_lie_beside_the_origins_of_the_bodies(stiffening):
     """Motion and reactions are those of the bodies in their own planes, and those computed in space."""

@@ -80,6 +80,7 @@ def test_numpy_alone_reads_the_file(tmp_path):
         assert json.loads(stored["meta"].tobytes())["name"] == "ünit"
 
 
+@pytest.mark.slow
 def test_no_flipped_byte_passes_unseen(tmp_path):
     """Every byte of the file is changed in turn: the file is refused, or the change was without meaning."""
     body = some_body(1)

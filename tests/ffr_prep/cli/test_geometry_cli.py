@@ -35,6 +35,7 @@ def folder(tmp_path_factory):
     return folder
 
 
+@pytest.mark.slow
 def test_from_a_step_file_of_another_program_to_a_body(folder, tmp_path, monkeypatch, capsys):
     """What a new user types, in a folder with the file alone: what is in it, two bores as interfaces, a body, a look."""
     monkeypatch.chdir(tmp_path)
@@ -71,6 +72,7 @@ def test_a_rigid_body_of_the_same_file(folder, tmp_path, capsys):
     assert "a rigid body: it does not deform" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_reference_conditions_say_which_interface_lies_at_their_region(folder, tmp_path, capsys):
     body, pin = tmp_path / "plate.ffr", "pin=cylinder r=6mm at -45,-25,5"
     coarse = (

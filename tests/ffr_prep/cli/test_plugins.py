@@ -100,6 +100,7 @@ def polynomials(tmp_path):
 # ---- a reduction --------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_reduction_of_ones_own_by_command_and_in_python(tmp_path, polynomials):
     """The same body both ways; a polynomial of degree 3 holds the bending of a beam with parabolic curvature."""
     command = ["--plugin", polynomials, "reduce", *BOX, "--method", "polynomials"]

@@ -56,6 +56,7 @@ def body_file(tmp_path_factory):
 # ---- the whole way ------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_stress_modes_are_kept_when_asked_for(tmp_path, body_file, capsys):
     run("reduce", *BAR, "--material", "steel", *INTERFACES, "--modes", 1, "--stress", "-o", tmp_path / "bar.ffr")
     surface = load_body(tmp_path / "bar.ffr").surface
@@ -87,6 +88,7 @@ def test_the_same_command_writes_the_same_bytes(body_file, tmp_path):
     assert one.provenance == two.provenance
 
 
+@pytest.mark.slow
 def test_damping_by_options(body_file, tmp_path, capsys):
     """Rayleigh's damping, a loss factor, ratios by mode and by frequency: of body and parts, each as `damped` has it."""
     plain = load_body(body_file)
@@ -176,6 +178,7 @@ def test_several_materials(tmp_path, capsys):
 # ---- pictures -----------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_pictures_of_modes(body_file, tmp_path, capsys):
     run("modes", body_file, "-o", tmp_path / "pictures", "--modes", "1,3")
     names = sorted(path.name for path in (tmp_path / "pictures").iterdir())

@@ -290,6 +290,7 @@ print(twice(21), sum(twice.stats.cache_hits.values()))
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("suffix", ["nbi", "nbc"])
 @pytest.mark.parametrize("damage", ["truncated", "empty", "zeros"])
 def test_damaged_compiled_code_is_made_anew(tmp_path, suffix, damage):

@@ -268,6 +268,7 @@ def test_sums_of_groups_and_node_sets(parts):
         with_regions(mesh, ["pin"])
 
 
+@pytest.mark.slow
 def test_a_body_keeps_what_was_asked_for(parts, tmp_path):
     """The bore of four faces is one interface, of the same place and shapes as the sum of its faces by name."""
     mesh = read_mesh(parts["plate"], size=12.0)
@@ -325,6 +326,7 @@ def test_what_is_meshed_already_is_neither_glued_nor_chosen(parts):
         read_mesh(MESHES / "box.geo", glue=True)
 
 
+@pytest.mark.slow
 def test_too_many_elements_are_refused_with_a_size_that_would_do(parts):
     with pytest.raises(InputError, match=r"far too many.*A size of 0\.") as refused:
         read_mesh(parts["plate"], size=0.01)
@@ -338,6 +340,7 @@ def test_too_many_elements_are_refused_with_a_size_that_would_do(parts):
         read_mesh(parts["plate"], most_elements=0)
 
 
+@pytest.mark.slow
 def test_sizes_and_lengths_that_cannot_be_meant_are_told(parts, tmp_path):
     (note,) = read_mesh(parts["plate"], size=500.0, order=1).notes
     assert "so size says nothing" in note
@@ -447,6 +450,7 @@ def rounded_in_a_corner(occ):
     occ.cut(body, [(3, occ.addCylinder(30, 15, 0, 0, 0, 8, 6)), *ends, (3, occ.addBox(50, 11, 0, 16, 8, 8))])
 
 
+@pytest.mark.slow
 def test_a_fillet_is_no_bore(tmp_path):
     """A cylinder from inside is a bore from half a turn on, in geometries and on meshes; `cylinder` means all."""
     path = written(rounded_in_a_corner, tmp_path / "angle.step")

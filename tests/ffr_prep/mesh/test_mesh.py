@@ -687,6 +687,7 @@ def test_connecting_rod(connecting_rod):
         assert np.ptp(nodes[:, 2]) == pytest.approx(0.022)
 
 
+@pytest.mark.slow
 def test_second_order_follows_the_bores(connecting_rod):
     """The volume converges faster than that of straight elements, which fill the bores and cut the outside."""
     fine = volume(read_mesh(MESHES / "connecting_rod.geo", unit="mm", size=4))
@@ -887,6 +888,7 @@ def corner_tetrahedron():
     return np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]), [("tetra", np.arange(4)[None])]
 
 
+@pytest.mark.slow
 def test_what_a_script_starts_ends_with_its_time(tmp_path):
     path = tmp_path / "endless.geo"
     path.write_text('SystemCall "sleep 60";\nSetFactory("OpenCASCADE");\nBox(1) = {0, 0, 0, 1, 1, 1};\n')

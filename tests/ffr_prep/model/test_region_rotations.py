@@ -130,6 +130,7 @@ def _stationary(A) -> np.ndarray:
     return R
 
 
+@pytest.mark.slow
 def test_a_mean_interface_holds_a_sheet_whatever_its_mesh():
     """A strip bent in its plane by a moment on its edge: as a beam, without the turning of single nodes that grows without
     bound as the mesh is refined."""
@@ -285,6 +286,7 @@ def test_buckling_of_a_column_with_a_rigid_end(kind, arm):
 # ---- motion -----------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("share", "what", "frame"),
     [

@@ -84,6 +84,7 @@ def test_parts_have_the_interfaces_of_the_whole_and_meet_at_their_cuts():
     assert first.interface("cut_1_a").position[0] == pytest.approx(1 / 3)
 
 
+@pytest.mark.slow
 def test_a_part_has_the_reference_conditions_if_it_has_their_interfaces():
     fixed = cut(MODELS["beam"](), 2)
     assert [part.provenance["reference"]["type"] for part in fixed.parts] == ["FixedTo", "MeanAxis"]
@@ -123,6 +124,7 @@ def test_every_part_has_what_was_asked_of_the_whole():
     assert body.parts[1].name == "bar_2"
 
 
+@pytest.mark.slow
 def test_a_file_holds_body_and_parts(tmp_path):
     body = cut(MODELS["beam"](), 3, stress=True)
     again = load_body(save_body(body, tmp_path / "bar.ffr"))
@@ -133,6 +135,7 @@ def test_a_file_holds_body_and_parts(tmp_path):
     assert "bar_3" in "\n".join(body_lines(again))
 
 
+@pytest.mark.slow
 def test_fewer_modes_and_one_more_point_reach_the_parts():
     body = truncated(cut(MODELS["hex20"](), 2), 5)
     assert [part.n for part in body.parts] == [5, 5]
@@ -231,6 +234,7 @@ def test_a_structure_file_says_its_parts(tmp_path, parts):
     assert [part.mass / body.mass for part in body.parts] == pytest.approx([0.5, 0.5])
 
 
+@pytest.mark.slow
 def test_the_command_takes_parts(tmp_path, capsys):
     geometry = tmp_path / "bar.geo"
     geometry.write_text(

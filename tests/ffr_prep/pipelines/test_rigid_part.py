@@ -54,6 +54,7 @@ def test_a_turned_part_has_turned_properties(files):
     np.testing.assert_allclose(there.centre_of_mass, [0.04, -0.01, 0.005], atol=1e-12)
 
 
+@pytest.mark.slow
 def test_elements_and_geometry_agree(files):
     exact, meshed = fp.rigid_part(files["plate"], RHO), fp.rigid_part(files["mesh"], RHO, unit="mm")
     assert meshed.mass == pytest.approx(exact.mass, rel=2e-3)

@@ -61,6 +61,7 @@ def body_of(path: Path) -> fp.FlexibleBody:
     return fp.reduce(structure.model(), structure.request)
 
 
+@pytest.mark.slow
 def test_the_file_of_the_documentation(tmp_path):
     loaded = read_structure(written(tmp_path, page("toml")[0]))
     check_frame(loaded.frame)
@@ -83,6 +84,7 @@ def test_the_programs_of_the_documentation_run(which, tmp_path, monkeypatch):
     assert space["body"].omega2[0] > 0
 
 
+@pytest.mark.slow
 def test_the_example_is_reduced_by_the_command(tmp_path):
     output = tmp_path / "tray.ffr"
     done = CliRunner().invoke(cli, ["reduce-structure", str(ROOT / "examples/tray.toml"), "-o", str(output)])
@@ -194,6 +196,7 @@ interfaces = {left = {}, right = {kind = "mean"}}
 """
 
 
+@pytest.mark.slow
 def test_a_solid_is_tied_to_a_frame(tmp_path):
     """Half beam, half solid: mass, length and frequencies of the whole cantilever; by file, by command."""
     (tmp_path / "box.geo").symlink_to(ROOT / "meshes" / "box.geo")

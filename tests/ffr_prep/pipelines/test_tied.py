@@ -62,6 +62,7 @@ def test_rigid_inertia_of_half_a_solid_and_half_a_beam_is_that_of_the_bar(seed, 
     assert [i.name for i in body.interfaces] == ["root", "tip"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["rigid", "mean"])
 def test_half_and_half_vibrates_as_one_bar(kind):
     """Bending both ways: between all beam and all solid, which agree to 2e-3 at this slenderness."""
@@ -72,6 +73,7 @@ def test_half_and_half_vibrates_as_one_bar(kind):
     np.testing.assert_allclose(half[:4], solid[:4], rtol=2e-3)
 
 
+@pytest.mark.slow
 def test_a_beam_cut_in_two_is_the_beam():
     """Every invariant, the stiffening and the motion of the interfaces, to rounding."""
     first = beam_half(0, 0.4, 4, left="root", right="joint")
@@ -122,6 +124,7 @@ def test_a_tie_between_points_that_differ_is_a_rigid_arm():
     )
 
 
+@pytest.mark.slow
 def test_a_plate_on_a_solid_and_a_beam_on_the_plate(tmp_path):
     """Three kinds in one body, with a drawing surface, stress and a file."""
     shell = panel(

@@ -151,6 +151,7 @@ def steady_tip(body, force):
     return body.interface("right").phi_t @ (force / body.omega2)
 
 
+@pytest.mark.slow
 def test_a_cantilever_sags_under_gravity():
     """q L^4 / 8 E I, through the integral of the modes alone; without Poisson's ratio, which the clamp would hinder."""
     size, material = (1.0, 0.02, 0.02), Material("beam", 2.1e11, 0.0, 7850.0)
@@ -200,6 +201,7 @@ def spin_growth(body, radius):
     return np.einsum("pc,pcn,n->p", radial, Phi, force / body.omega2).mean()
 
 
+@pytest.mark.slow
 def test_a_thin_ring_grows_under_spin():
     """rho Omega^2 R^3 / E."""
     radius = 1.0
@@ -320,6 +322,7 @@ def test_many_interfaces_are_not_all_listed(judged):
     assert any("6 more" in line for line in said)
 
 
+@pytest.mark.slow
 def test_pictures(judged, tmp_path):
     paths = quality_pictures(judged, tmp_path / "q")
     assert [path.name for path in paths] == ["receptances.png", "errors.png"]
@@ -333,6 +336,7 @@ def test_pictures(judged, tmp_path):
 REDUCE = ["reduce", *BAR, "--material", "steel", *INTERFACES]
 
 
+@pytest.mark.slow
 def test_the_command_line_joins_reductions_and_reports(tmp_path, capsys):
     methods = ["--method", "craig-bampton", "--method", "inertia-relief", "--modes", 4]
     run(*REDUCE, *methods, "--quality", tmp_path / "q", "--band", "10,500", "-o", tmp_path / "b.ffr")
@@ -365,6 +369,7 @@ def test_methods_on_the_command_line(options, reduction, tmp_path):
     assert load_body(tmp_path / "b.ffr").provenance["reduction"] == reduction
 
 
+@pytest.mark.slow
 def test_accuracy_on_the_command_line(tmp_path):
     run(*REDUCE, "--method", "rubin", "--accuracy", "10,600,0.1", "--quality", tmp_path / "q", "-o", tmp_path / "b.ffr")
     assert quality_of(load_body(tmp_path / "b.ffr").provenance).receptance_errors.max() <= 0.1

@@ -204,6 +204,7 @@ def test_determinate_conditions_span_the_same_total_motion(model):
         assert scipy.linalg.subspace_angles(spaces[0], other).max() < 1e-8
 
 
+@pytest.mark.slow
 def test_free_free_frequencies_do_not_depend_on_the_reference_conditions(beam):
     bodies = [reduced(beam, reference, CraigBampton(6)) for reference in REFERENCES]
     frequencies = [free_free_frequencies(body) for body in bodies]

@@ -280,6 +280,7 @@ def test_craig_bampton_converges_on_a_fine_bar(modes, error):
 # ---- selection --------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", [CraigBampton, Eigenmodes, Rubin])
 def test_modes_up_to_a_frequency(model, body, kind):
     L = functionals(MeanAxis(), model)
@@ -291,6 +292,7 @@ def test_modes_up_to_a_frequency(model, body, kind):
         np.testing.assert_array_equal(found.omega2.size, kind(count).basis(model, body, L).omega2.size)
 
 
+@pytest.mark.slow
 def test_accuracy_adds_modes_until_the_receptances_are_right(model, body):
     band, tolerance = Band(10.0, 1500.0), 0.01
     L = functionals(FixedTo("left"), model)
@@ -307,6 +309,7 @@ def test_accuracy_adds_modes_until_the_receptances_are_right(model, body):
     assert error(count) <= tolerance < error(count - 1)
 
 
+@pytest.mark.slow
 def test_accuracy_that_modes_alone_do_not_reach_is_refused(model, body):
     with pytest.raises(ComputationError, match=r"still more than 0.0001 off: allow a larger error"):
         Eigenmodes(Accuracy(Band(10.0, 500.0), 1e-4)).basis(model, body, functionals(FixedTo("left"), model))
@@ -325,6 +328,7 @@ def test_the_reference_is_the_full_model(model, body):
     assert receptance_error(reference, complete, band.frequencies()).max() < 1e-6
 
 
+@pytest.mark.slow
 def test_receptances_are_those_of_the_damped_equations(model):
     omega2, vectors = scipy.linalg.eigh(model.K.toarray(), model.M.toarray())
     modes = free_modes(

@@ -181,6 +181,7 @@ def stressed_solid(reference):
     return fp.reduce(solid(KINDS[2]), fp.Request(name="b", reference=reference, reduction=CraigBampton(4), stress=True))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("make", [portal, stressed_solid])
 def test_no_frame_changes_the_stress(make, exact):
     """Strains of second order are those of Green, or of axes that turn with the sections."""
@@ -217,6 +218,7 @@ def chain(ties):
     return fp.reduce(tied(parts, ties), fp.Request(name="b", reference=FixedTo("a"), reduction=CraigBampton(4)))
 
 
+@pytest.mark.slow
 def test_parts_stay_together_whichever_follows_the_other(exact):
     """Distances across a tie keep to third order; and no order of ties changes anything."""
     orders = (

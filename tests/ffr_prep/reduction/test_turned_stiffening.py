@@ -161,6 +161,7 @@ def test_converting_is_reducing_in_the_new_frame(made, kind, old, new):
     assert_equal(with_reference(made[kind][old], new), made[kind][new], slice(None), 1e-9)
 
 
+@pytest.mark.slow
 def test_converting_plates_is_nearly_reducing_in_the_new_frame():
     """Loads in their plane, to the square of the element size; bending moments of plates stiffen nothing."""
     plates = {reference: plate(reference) for reference in REFERENCES}
@@ -198,6 +199,7 @@ def test_more_conditions_than_six_share_the_loads(rods):
 # ---- motions ------------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_the_motion_of_a_slider_crank_is_the_same():
     """The rod of the stiffened slider-crank, reduced in one frame and converted, against reduced there: the deflection
     of its middle from the chord, which is 4.3 mm at most."""

@@ -20,12 +20,16 @@ p = partial
 
 def changed(name: str, pattern: str, new: str, after: str = "") -> Case:
     """A sample in which the first match behind a text is replaced."""
-    text = (samples() / name).read_text()
-    at = text.index(after)
-    wrong = text[:at] + re.sub(pattern, new, text[at:], count=1, flags=re.MULTILINE)
-    assert wrong != text, pattern
+
+    def wrong() -> str:
+        text = (samples() / name).read_text()
+        at = text.index(after)
+        found = text[:at] + re.sub(pattern, new, text[at:], count=1, flags=re.MULTILINE)
+        assert found != text, pattern
+        return found
+
     return Case(
-        lambda: with_files(lambda: import_body(Path(name)), {name: (("", wrong),)} if wrong else {}),
+        lambda: with_files(lambda: import_body(Path(name)), {name: (("", wrong()),)}),
         lambda: with_files(lambda: import_body(Path(name)), {}),
     )
 

@@ -65,6 +65,7 @@ def test_faces_show_themselves_in_short(faces):
     assert "<td>plane z=5mm  (plane, normal " in faces._repr_html_()
 
 
+@pytest.mark.slow
 def test_the_picture_numbers_what_is_seen(faces, tmp_path):
     path = fp.face_picture(faces, tmp_path / "plate.png")
     picture = np.asarray(Image.open(path).convert("RGB")).astype(int)

@@ -56,6 +56,7 @@ def test_an_isotropic_matrix_in_any_axes_is_the_isotropic_material(kind):
     np.testing.assert_array_equal(one.m.toarray(), other.m.toarray())
 
 
+@pytest.mark.slow
 def test_a_body_of_an_isotropic_matrix_is_the_isotropic_body():
     mesh = box_mesh("hex20", (1.0, 0.1, 0.05), (4, 1, 1))
     one, other = reduced(mesh, STEEL), reduced(mesh, AnisotropicMaterial("steel", six_by_six(*LAME), STEEL.rho))

@@ -52,6 +52,7 @@ def test_all_faces_together_are_the_surface_each_once(mesh, plate):
     assert sorted(np.concatenate(parts)) == list(range(len(plate.surface.triangles)))
 
 
+@pytest.mark.slow
 def test_a_pressure_on_a_region_that_the_body_keeps(mesh, plate):
     top = fp.region_triangles(mesh, plate, "plane z=10")
     kept = replace(plate, provenance={**plate.provenance, "regions": {"top": top.tolist()}})

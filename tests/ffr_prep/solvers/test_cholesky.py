@@ -130,6 +130,7 @@ def test_the_same_matrix_gives_the_same_bits_with_any_number_of_threads(monkeypa
         assert solve_cholesky(again, b).tobytes() == x.tobytes()
 
 
+@pytest.mark.slow
 def test_large_fronts_are_eliminated_by_tiles(monkeypatch):
     """The same numbers as in one piece, up to rounding."""
     A, positions = clamped("tet10", (8, 4, 4))

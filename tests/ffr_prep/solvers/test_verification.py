@@ -35,6 +35,7 @@ def searched(model, count):
     return held, coupled.M, *normal_modes(coupled, held, count)
 
 
+@pytest.mark.slow
 def test_hundreds_of_modes_are_those_of_eigsh(model):
     held, M, omega2, modes = searched(model, 200)
     found = held.body.verify(held, M, omega2, modes)

@@ -72,6 +72,7 @@ def test_buckling_of_a_cantilever():
     assert weight == pytest.approx(7.8373 * STEEL.E * section.Iz, rel=2e-4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("eta", "mu"), [(0, 3.5160152685), (1, 3.6816468140), (3, 4.7972785324), (6, 7.3603730193), (10, 11.202327762)]
 )

@@ -33,6 +33,7 @@ def reduced(frame):
     )
 
 
+@pytest.mark.slow
 def test_portal_from_a_file_is_the_portal_of_a_few_lines():
     columns = [polyline([(x, 0, 0), (x, 2, 0)], MEMBERS["columns"], elements=4) for x in (0, 3)]
     beam = polyline([(0, 2, 0), (1.5, 2, 0), (3, 2, 0)], MEMBERS["beam"], elements=3)
@@ -124,6 +125,7 @@ SHELLS = {"floor": Shell(0.002, STEEL), "walls": Shell(0.003, STEEL)}
 RIMS = {"rims": Member(tube(0.02, 0.002), STEEL)}
 
 
+@pytest.mark.slow
 def test_tray_of_sheet_with_beams_along_its_rims():
     """Triangles, quadrilaterals and lines of one mesh share their nodes; mass and centre in closed form."""
     frame = read_frame(TRAY, RIMS, shells=SHELLS)

@@ -111,6 +111,7 @@ def test_rotating_strip(eta, mu, cut):
     assert np.sqrt(values[flap][0] / unit) == pytest.approx(mu, rel=2e-3)
 
 
+@pytest.mark.slow
 @CUT
 def test_rotating_strip_in_its_plane(cut):
     """A strip that turns about the normal of its plane lags: mu_lag^2 = mu_flap^2 - eta^2 of the beam (see above)."""

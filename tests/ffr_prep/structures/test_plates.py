@@ -268,6 +268,7 @@ def folded(R=None) -> Frame:
     return named(joined(first, triangulated(second), fold), a=a, b=b)
 
 
+@pytest.mark.slow
 def test_beams_and_plates_turn_together():
     R = rotation(5)
     ends = [InterfaceRegion("a"), InterfaceRegion("b")]

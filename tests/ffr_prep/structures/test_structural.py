@@ -502,6 +502,7 @@ def test_a_group_of_nodes_moves_as_one():
     assert model.kinds == ("rigid", "node")
 
 
+@pytest.mark.slow
 def test_complete_reduction_does_not_depend_on_its_interfaces():
     """All fixed-interface modes and static shapes span the model: the modes of the free body, however it is reduced."""
     frame = space_frame()

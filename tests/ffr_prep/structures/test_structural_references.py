@@ -129,6 +129,7 @@ def ring(elements: int, seed: int = 0) -> Frame:
     return Frame(corners[:-1], pairs, tuple(members), np.arange(elements))
 
 
+@pytest.mark.slow
 def test_ring_of_straight_beams():
     """Free ring in its plane: omega_k^2 = E I/(rho A R^4) k^2 (k^2 - 1)^2/(k^2 + 1), each twice.
 
