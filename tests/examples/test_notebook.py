@@ -43,6 +43,7 @@ def shown(cells, start):
     return kinds, "".join(output.get("text", "") for output in cell.outputs)
 
 
+@pytest.mark.slow
 def test_bodies_scenes_and_results_are_tables(cells):
     for words in ("rod = fp.reduce", "scene = fd.Scene", "result = fd.forward"):
         kinds, _ = shown(cells, words)

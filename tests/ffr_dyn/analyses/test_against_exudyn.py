@@ -32,6 +32,7 @@ def test_pendulum_over_half_a_second(kind):
     assert compared.distance(found, best).max() < AGREEMENT
 
 
+@pytest.mark.slow
 def test_gravity_on_the_undeformed_body_is_seen():
     """Exudyn's own load for gravity leaves out the moment (I3 q) x g; the comparison notices a term of this size."""
     case = compared.pendulum_case("rigid", (2e-4,))

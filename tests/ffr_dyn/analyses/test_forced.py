@@ -62,6 +62,7 @@ def swept() -> fd.Result:
     return fd.forced(duffing(), input="rail.force", amplitude=FORCE, outputs=["m.c.position.x"], band_of=(1.05, 1.75))
 
 
+@pytest.mark.slow
 def test_duffings_oscillator_is_that_of_harmonic_balance(swept):
     """Stable and unstable, the first and the third harmonic; the branch turns back twice."""
     f = swept["frequency"]

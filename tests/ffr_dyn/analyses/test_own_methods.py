@@ -92,6 +92,7 @@ def test_a_method_of_ones_own_runs_from_a_file_a_command_and_python(write, tmp_p
     assert np.abs(found["energy.total"] - found["energy.total"][0]).max() < 1e-2
 
 
+@pytest.mark.slow
 def test_a_method_of_ones_own_is_in_schema_commands_and_written_files(write, tmp_path):
     file = write(METHOD, "end = 0.2\noutput_step = 0.02")
     scene = fd.load_scene(file)[0]

@@ -51,6 +51,7 @@ def test_newton_is_quadratic_in_one_load_step(count):
     np.testing.assert_allclose(K, K.T, rtol=0, atol=1e-9 * np.abs(K).max())
 
 
+@pytest.mark.slow
 def test_forces_and_rows_are_met_to_rounding():
     there = found(bent(4, 1.2))
     reactions = np.linalg.lstsq(there.balance.jacobian.T, there.balance.forces, rcond=None)[0]

@@ -120,6 +120,7 @@ def test_arrows_are_asked_for_by_name_or_pattern():
         loads_named(beside, ["hnge"])
 
 
+@pytest.mark.slow
 def test_a_film_of_pictures_has_the_arrows_that_are_asked_for_and_no_others(tmp_path):
     """In the colour of forces, which nothing else has here; on the page they are switched on."""
     with_and_without = []

@@ -116,6 +116,7 @@ def test_its_kernel_equals_its_law(scene):
     np.testing.assert_allclose(engine.work.bodies.f, twin.generalised, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_energy_is_kept_and_accounted_for(scene):
     outputs = ("default", "*.power", "*.work", "energy.*", "pull.*")
     result = integrate(scene, end=0.4, output_step=0.01, method=RK4(5e-4), outputs=outputs)

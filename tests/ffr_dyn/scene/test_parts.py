@@ -287,6 +287,7 @@ def test_a_result_tells_how_many_parts_would_do():
         parts_needed(whole(), small, angle=0.0)
 
 
+@pytest.mark.slow
 def test_parts_know_better_where_a_body_bends():
     """A part of two bends by more than half of the whole: the note is of the worst, and of all."""
     scene = bent(2)

@@ -173,6 +173,7 @@ def test_a_second_study_to_one_output_is_refused(folder):
     assert not journal_of(folder / "t.nc").exists()
 
 
+@pytest.mark.slow
 def test_workers_make_the_same_file(folder):
     fd.sweep(folder / "study.toml", folder / "whole.nc", workers=0)
     fd.sweep(folder / "study.toml", folder / "t.nc", workers=2)

@@ -56,6 +56,7 @@ def of_kind(faces, kind):
 # ---- what faces are -------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_surfaces_are_those_that_were_drawn(parts):
     faces = faces_of(parts["every surface"])
     (ball,), (cone,), (ring,), (bore,) = (of_kind(faces, kind) for kind in ("sphere", "cone", "torus", "cylinder"))

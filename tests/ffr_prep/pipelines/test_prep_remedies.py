@@ -56,6 +56,7 @@ def test_a_text_is_raised_and_its_remedy_works(number):
     CASES[number].mended()
 
 
+@pytest.mark.slow
 def test_every_text_has_a_case():
     said = [message(k) for k in range(len(CASES))]
     missing = {m: [t.pattern for t in found if not any(map(t.search, said))] for m, found in texts().items()}

@@ -130,6 +130,7 @@ def test_interfaces_move_as_the_load_matrices_say(kind, kinds, reference):
         np.testing.assert_allclose(moved, -K[12:, i, i:], rtol=0, atol=1e-10 * np.abs(K[12:]).max())
 
 
+@pytest.mark.slow
 def test_the_drawn_face_of_a_rigid_interface_moves_as_one_piece(made):
     """By u_2 and the rotation vector theta_2 of the interface, and phi x (phi x r) / 2."""
     body = made["solid, rigid"][MEAN]

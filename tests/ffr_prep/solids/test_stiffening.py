@@ -42,6 +42,7 @@ def rod():
     )
 
 
+@pytest.mark.slow
 def test_matrices_are_symmetric_and_one_for_each_load(rod):
     assert rod.stiffening.shape == (INERTIAL + 12, rod.n, rod.n)
     np.testing.assert_array_equal(rod.stiffening, rod.stiffening.transpose(0, 2, 1))
