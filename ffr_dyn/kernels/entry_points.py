@@ -495,6 +495,12 @@ def step(r: Tables, t: float, again: int) -> int:
 
 
 @entry_point()
+def close(r: Tables, t: float) -> int:
+    """Bring the state onto the constraints with the diagonal of the last step, if there was one."""
+    return stabilise(r, t, r.x, r.v) if r.work.diagonal[0] >= 0.0 else OK
+
+
+@entry_point()
 def settle(r: Tables, t: float) -> int:
     """Bring the state onto constraints whose rates have jumped: the velocities change by an impulse, which springs, dampers
     and elastic forces have no part in."""
@@ -505,7 +511,7 @@ def settle(r: Tables, t: float) -> int:
 @entry_point()
 def whole_step(r: Tables, t: float, again: int) -> int:
     """One step in as many pieces as functions of time break it into."""
-    return step_in_pieces(r, step, find_break, settle, t, again)
+    return step_in_pieces(r, step, find_break, close, settle, t, again)
 
 
 @entry_point()
@@ -553,7 +559,7 @@ def run_controlled(r: Tables, start: float, out: Record) -> int:
     for row in range(out.time.size):
         t = start + (steps[NEXT] + steps[PER_ROW]) * r.clock.time[SPACING]
         while c.numbers[NOW] < t:
-            status = step_to_break(r, step, find_break, settle)
+            status = step_to_break(r, step, find_break, close, settle)
             if status != OK:
                 return status
         copy(c.held_x, r.x)

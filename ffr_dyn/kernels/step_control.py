@@ -89,8 +89,12 @@ def look_behind(r, find, t, near):
 
 
 @inlined
-def step_in_pieces(r, step, find, settle, t, again):
-    """One step from time t in pieces that end where functions of time break. Returns a status."""
+def step_in_pieces(r, step, find, close, settle, t, again):
+    """One step from time t in pieces that end where functions of time break. Returns a status.
+
+    What steps and pieces have left the constraints by is closed as longer steps do it, before a short piece would: that
+    excites stiff modes. Only what jumps at a break is an impulse (`settle`).
+    """
     time, found = r.clock.time, r.clock.found
     h = time[H]
     if not has_breaks(r.model.functions):
@@ -101,7 +105,8 @@ def step_in_pieces(r, step, find, settle, t, again):
     find(r, t + near, end + near)
     if before == math.inf and found[SINCE] == math.inf:
         return step(r, t, again)
-    now, last, status = t, False, OK
+    now, last = t, False
+    status = close(r, t) if before == math.inf else OK
     while status == OK and not last:
         if look_behind(r, find, now, near):
             status = settle(r, now)
@@ -111,6 +116,8 @@ def step_in_pieces(r, step, find, settle, t, again):
         time[H] = (end if last else found[UNTIL]) - now
         if status == OK:
             status = step(r, now, RESTART)
+        if status == OK and since < math.inf:
+            status = close(r, time[UP_TO])
         now = since
     time[H] = h
     look_anywhere(time)
@@ -131,7 +138,7 @@ def worst(error, before, after, weight, relative, h):
 
 
 @inlined
-def step_to_break(r, step, find, settle):
+def step_to_break(r, step, find, close, settle):
     """One accepted step that ends, at the latest, where a function of time breaks. Returns a status."""
     numbers, time, found = r.control.numbers, r.clock.time, r.clock.found
     numbers[STEP] = min(numbers[STEP], numbers[LONGEST])
@@ -145,10 +152,14 @@ def step_to_break(r, step, find, settle):
     if end < math.inf:
         numbers[STEP] = end - now
     status = settle(r, now) if fresh else OK
+    if end < math.inf and not fresh:
+        status = close(r, now)
     if status == OK:
         status = controlled_step(r, step, RESTART if fresh else 0)
     if not numbers[NOW] < end - near:
         numbers[STEP] = max(numbers[STEP], wanted)
+        if status == OK:
+            status = close(r, end)
     look_anywhere(time)
     return status
 
