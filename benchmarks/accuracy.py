@@ -1,6 +1,6 @@
 """Whether runs know their error, on the benchmark set and variants of it.
 
-    python -m benchmarks.accuracy [--method ros2] [--variants plain,undamped,...] [--unseen] [case ...]
+    python -m benchmarks.accuracy [--method ros2] [--variants plain,undamped,...] [--unseen | --all] [case ...]
 
 For every scene, with the step that is found for an accuracy of 1e-3 and with steps given around it:
 
@@ -12,11 +12,11 @@ For every scene, with the step that is found for an accuracy of 1e-3 and with st
     cost     evaluations of all runs over those of the final one: of a default run, search and check included, and what the
              check of a given step adds
 
-and at the end a table, a line for each method and variant. The truth is RK4 with a step that resolves the fastest vibration
+and at the end a table, a line for each method and variant, and one for all variants of a method. The truth is RK4 with a step that resolves the fastest vibration
 (h omega <= 0.3), no longer than a sixteenth of the run's or a 256th of a row, and is kept in `out/references`; true errors
 below its own distance from the same with twice the step are left out, and so are scenes where it takes more than LONGEST
 steps. Variants: "plain", "undamped", "shock" (bodies set off with a deflection), "soft" and "stiff" (frequencies a third and
-four times as high). `--unseen` takes the scenes of `benchmarks.unseen`, on which nothing was chosen.
+four times as high). `--unseen` takes the scenes of `benchmarks.unseen`, on which nothing was chosen, `--all` both.
 """
 
 from __future__ import annotations
@@ -185,8 +185,8 @@ def line(name: str, found: Found) -> str:
     )
 
 
-def report(method: str, cases: Sequence[Case], variant: str) -> str:
-    """Print the outcome for each scene; returns that of all of them in a line."""
+def report(method: str, cases: Sequence[Case], variant: str) -> list[Found]:
+    """Print the outcome for each scene, and return it."""
     print(f"\n{method}: told over true errors; true errors in thousandths of ranges; costs in final runs\n"
           f"{'scene':26}{'pairs':>6}{'in %':>8}{'low %':>7}{'least':>8}{'most':>8}{'places':>9}{'forces':>9}{'silent':>8}"
           f"{'cost':>7}{'extra':>7}")  # fmt: skip
@@ -199,7 +199,7 @@ def report(method: str, cases: Sequence[Case], variant: str) -> str:
             continue
         every.append(found)
         print(line(name, found), flush=True)
-    return summary(f"{method} {variant}", every)
+    return every
 
 
 WORDS = ("scenes", "pairs", "in %", "low %", "places %", "forces", "silent", "cost", "extra")
@@ -236,9 +236,13 @@ def main() -> None:
     methods = option(arguments, "--method", "ros2,ros3").split(",")
     variants = option(arguments, "--variants", ",".join(VARIANTS)).split(",")
     listed = UNSEEN if "--unseen" in arguments else CASES
-    names = [name for name in arguments if name != "--unseen"]
+    listed = [*CASES, *UNSEEN] if "--all" in arguments else listed
+    names = [name for name in arguments if name not in ("--unseen", "--all")]
     cases = [case for case in listed if not names or case.name in names]
-    lines = [report(method, cases, variant) for method in methods for variant in variants]
+    found = {(method, variant): report(method, cases, variant) for method in methods for variant in variants}
+    together = {method: [one for variant in variants for one in found[method, variant]] for method in methods}
+    lines = [summary(" ".join(of), every) for of, every in found.items() if every]
+    lines += [summary(f"{method} all", every) for method, every in together.items() if every]
     print("\n" + "\n".join([HEAD, *lines]))
 
 
