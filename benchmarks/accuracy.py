@@ -12,11 +12,12 @@ For every scene, with the step that is found for an accuracy of 1e-3 and with st
     cost     evaluations of all runs over those of the final one: of a default run, search and check included, and what the
              check of a given step adds
 
-and at the end a table, a line for each method and variant, and one for all variants of a method. The truth is RK4 with a step that resolves the fastest vibration
-(h omega <= 0.3), no longer than a sixteenth of the run's or a 256th of a row, and is kept in `out/references`; true errors
-below its own distance from the same with twice the step are left out, and so are scenes where it takes more than LONGEST
-steps. Variants: "plain", "undamped", "shock" (bodies set off with a deflection), "soft" and "stiff" (frequencies a third and
-four times as high). `--unseen` takes the scenes of `benchmarks.unseen`, on which nothing was chosen, `--all` both.
+and at the end a table, a line for each method and variant, and one for all variants of a method. The truth is RK4 with a
+step that resolves the fastest vibration (h omega <= 0.3), no longer than a sixteenth of the run's or a 256th of a row, and is
+kept in `out/references`; true errors below its own distance from the same with twice the step are left out, and so are scenes
+where it takes more than LONGEST steps. Variants: "plain", "undamped", "shock" (bodies set off with a deflection), "soft" and
+"stiff" (frequencies a third and four times as high). `--unseen` takes the scenes of `benchmarks.unseen`, on which nothing was
+chosen, `--all` both.
 """
 
 from __future__ import annotations
