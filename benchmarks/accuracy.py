@@ -33,8 +33,9 @@ from ffr_gallery.scene_set import CASES, Case
 
 from benchmarks.unseen import UNSEEN
 from ffr_dyn.analyses.checkpoint import fingerprint
-from ffr_dyn.analyses.forward import DRIVING, forward
+from ffr_dyn.analyses.forward import forward
 from ffr_dyn.analyses.integration import integrate
+from ffr_dyn.analyses.trials.search import DRIVING
 from ffr_dyn.consistency.assemble import assemble
 from ffr_dyn.consistency.step_error import PLACES, largest_difference, ranges, roundings
 from ffr_dyn.consistency.unresolved import vibrations

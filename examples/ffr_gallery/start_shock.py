@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ffr_dyn.analyses.forward import Beginning, forward
+from ffr_dyn.analyses.forward import forward
+from ffr_dyn.analyses.trials.begin import Beginning
 from ffr_dyn.functions.time_functions import polynomial
 from ffr_dyn.integrators import ROS3
 from ffr_dyn.results.result import Result

@@ -8,8 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from ffr_dyn.analyses.events import Event
-from ffr_dyn.analyses.forward import Beginning, forward
+from ffr_dyn.analyses.forward import forward
 from ffr_dyn.analyses.integration import check_method, check_output_step
+from ffr_dyn.analyses.trials.begin import Beginning
 from ffr_dyn.functions.together import Say, together
 from ffr_dyn.integrators import Integrator, Within
 from ffr_dyn.integrators.stabilisation import Projection, Stabilisation

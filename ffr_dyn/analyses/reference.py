@@ -14,10 +14,10 @@ from pathlib import Path
 
 import numpy as np
 
-from ffr_dyn.analyses.forward import Beginning, begun
 from ffr_dyn.analyses.ida import by_ida
 from ffr_dyn.analyses.integration import geometry, with_all_reactions
 from ffr_dyn.analyses.outcome import output_times
+from ffr_dyn.analyses.trials.begin import Beginning, begun
 from ffr_dyn.consistency.assemble import Assembled, assemble
 from ffr_dyn.consistency.doubts import checked
 from ffr_dyn.consistency.evaluation import Evaluator, accelerations, closed, copied, evaluator, joined

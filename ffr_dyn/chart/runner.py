@@ -25,8 +25,8 @@ from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
-from ffr_dyn.analyses.forward import Beginning, begun
 from ffr_dyn.analyses.integration import fast_within, integrate
+from ffr_dyn.analyses.trials.begin import Beginning, begun
 from ffr_dyn.chart.measures import Measure
 from ffr_dyn.chart.variants import Variant
 from ffr_dyn.compile.first_use import ensure_compiled

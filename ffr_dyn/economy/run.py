@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ffr_dyn.analyses.forward import Beginning, begun
 from ffr_dyn.analyses.integration import fast_within, integrate
+from ffr_dyn.analyses.trials.begin import Beginning, begun
 from ffr_dyn.consistency.assemble import Assembled, assemble
 from ffr_dyn.economy.cost import of_evaluations, of_run
 from ffr_dyn.economy.model_choice import Choice, applied

@@ -23,8 +23,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ffr_dyn.analyses.events import Event
-from ffr_dyn.analyses.forward import Beginning, Forward, forward
+from ffr_dyn.analyses.forward import Forward, forward
 from ffr_dyn.analyses.settings import Settings
+from ffr_dyn.analyses.trials.begin import Beginning
 from ffr_dyn.consistency.assemble import Assembled, assemble, body_doubts
 from ffr_dyn.economy.cache import Ledger, Tried
 from ffr_dyn.economy.checks import frequencies, stiffening_loads, stress_doubts

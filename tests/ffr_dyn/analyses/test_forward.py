@@ -164,7 +164,7 @@ def test_an_error_that_leaves_out_what_steps_damp_says_so(monkeypatch):
     def failing(*_):
         raise ComputationError("the energy has grown")
 
-    monkeypatch.setattr("ffr_dyn.analyses.forward._twin", failing)
+    monkeypatch.setattr("ffr_dyn.analyses.trials.errors._twin", failing)
     found = forward(swinging(0.02), **SPAN, method=ROS2(1e-3), check=True)
     assert found.attributes["errors"]
     assert sum("leaves out vibration" in note for note in found.attributes["notes"]) == 1

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from synthetic import cloud
 
-from ffr_dyn.analyses import forward as module
 from ffr_dyn.analyses.forward import forward
 from ffr_dyn.analyses.integration import integrate
+from ffr_dyn.analyses.trials import errors, search
 from ffr_dyn.consistency.step_error import StepError, begins_alone, largest_difference, ranges, with_start
 from ffr_dyn.integrators import RK4, ROS2, ROS3, Within
 from ffr_dyn.integrators.stabilisation import Projection
@@ -69,9 +69,9 @@ def test_after_a_shock_no_error_is_less_than_a_third_of_the_true_one(seed, dampi
 
 def test_a_search_that_ends_at_the_finest_step_tells_all_of_its_error(monkeypatch):
     scene = struck(0, 0.05, 5.0)
-    monkeypatch.setattr(module, "FINEST", module.FIRST)
+    monkeypatch.setattr(search, "FINEST", search.FIRST)
     found = forward(scene, **SPAN, method=Within(1e-8))
-    given = forward(scene, **SPAN, method=ROS2(ROW / module.FIRST), stabilisation=Projection(1e-16))
+    given = forward(scene, **SPAN, method=ROS2(ROW / search.FIRST), stabilisation=Projection(1e-16))
     assert found.attributes["step"] == given.attributes["step"]
     for name, (told, _) in found.attributes["errors"].items():
         assert told == pytest.approx(given.attributes["errors"][name][0], rel=1e-6, abs=1e-12), name
@@ -83,7 +83,7 @@ def test_steps_whose_double_a_twin_does_not_bear_have_no_order(monkeypatch):
 
     scene, method = struck(0, 0.05, 5.0), ROS3(ROW / 8)
     sure = forward(scene, **SPAN, method=method)
-    monkeypatch.setattr(module, "_longer_twin", fails)
+    monkeypatch.setattr(errors, "_longer_twin", fails)
     found = forward(scene, **SPAN, method=method)
     other = integrate(scene, **SPAN, method=ROS3(ROW / 2), stabilisation=Projection(1e-11))
     first_order = {name: largest_difference(found[name], other[name]) / 3 for name in sure.attributes["errors"]}

@@ -1,0 +1,72 @@
+"""The step for an accuracy."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from ffr_dyn.analyses.trials.errors import Trial, beside_twin, further_runs, leap_of, with_its_errors
+from ffr_dyn.analyses.trials.notes import finished
+from ffr_dyn.analyses.trials.runs import Runs
+from ffr_dyn.consistency.step_error import (
+    PLACES,
+)
+from ffr_dyn.integrators import Within, stepped
+from ffr_dyn.results.result import Result
+from ffr_prep.common.errors import ComputationError, InputError
+
+FIRST, FINEST = 4, 1024  # steps to an output row: of the first trial, and at most
+MARGIN = 2.0  # by which a trial aims below the accuracy
+SLOW = 0.7  # a ringing output's error falls slower than the step to this power,
+IN_COMPANY = 1.4  # or to this one, if it is of vibration, where others ring
+
+# What a step is to keep within the accuracy always, and what where it does not ring.
+DRIVING = re.compile(r"\.(displacement|rotation|force|moment|effort|torque|tension)$|^measured\.")
+
+
+def searched(runs: Runs, within: Within, kept: dict[str, Any], count: int) -> Result:
+    """The run with the longest step found that keeps the accuracy; where forces ring, of those that keep the positions."""
+    trials, ringing, path = list[Trial](), set[str](), kept["path"] or kept["resume"]
+    while True:
+        method = stepped(within, runs.output_step / count)
+        try:
+            trial, _ = beside_twin(runs, method, count, kept)
+        except (ComputationError, InputError):
+            if count >= FINEST:
+                raise
+            count *= FIRST
+            continue
+        if not trial.errors or count >= FINEST or _excess(trial, ringing, trials) <= within.accuracy:
+            trial = with_its_errors(
+                runs, trial, *runs.together(further_runs(runs, method, count, trials), leader=False)
+            )
+        excess = _excess(trial, ringing, trials) / within.accuracy
+        trials.append(trial)
+        if excess <= 1.0 or count >= FINEST:
+            return finished(runs, trial, path, ringing)
+        count, kept = _next(count, excess, leap_of(method)), {**kept, "path": path, "resume": None}
+
+
+def _next(count: int, excess: float, leap: int) -> int:
+    """Steps to a row, an even number, at least twice as many."""
+    wanted = count * float(np.clip((MARGIN * excess) ** 0.5, 2.0, leap))
+    return min(FINEST, 2 * int(np.ceil(wanted / 2)))
+
+
+def _excess(trial: Trial, ringing: set[str], earlier: Sequence[Trial]) -> float:
+    """The largest error over range of what a trial is to keep; infinite where no error could be told. Outputs that ring, for
+    which shorter steps have ceased to help, are added to those that do."""
+    if not trial.errors:
+        return np.inf
+    for before in (one for one in earlier[-1:] if one.errors):
+        driving = [name for name in trial.errors if DRIVING.search(name)]
+        left = {name: trial.errors[name].error / max(before.errors[name].error, 1e-300) for name in driving}
+        ringing |= {name for name in driving if left[name] > (trial.count / before.count) ** -SLOW}
+        if ringing:
+            vibrating = (name for name in driving if trial.errors[name].vibrates)
+            ringing |= {name for name in vibrating if left[name] > (trial.count / before.count) ** -IN_COMPANY}
+    wanted = (name for name in trial.errors if PLACES.search(name) or DRIVING.search(name))
+    return max((trial.errors[name].of_range for name in wanted if name not in ringing), default=0.0)
