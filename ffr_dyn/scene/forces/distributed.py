@@ -100,9 +100,23 @@ def compiled_integrals(force: Any, table: LoadTable) -> LawNumbers:
     return LawNumbers(_integrals(force, table.scene).numbers(), table.function(force.function))
 
 
+class _This:
+    """A force as a key: itself, and no other of equal values, which arrays do not tell."""
+
+    def __init__(self, force: Any) -> None:
+        self.force = force
+
+    def __hash__(self) -> int:
+        return id(self.force)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _This) and other.force is self.force
+
+
 def _integrals(force: Any, scene: Scene) -> Affine | Spread:
-    """Those of the body as it moves in the scene."""
-    made: Affine | Spread = force.integrals(moving_model(force.place.of(scene)))
+    """Those of the body as it moves in the scene, found once: laws are asked thousands of times."""
+    model = moving_model(force.place.of(scene))
+    made: Affine | Spread = remembered(model, _This(force), lambda: force.integrals(model))
     return made
 
 

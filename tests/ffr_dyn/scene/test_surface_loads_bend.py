@@ -118,3 +118,10 @@ def test_a_body_in_its_mean_axis_form_keeps_the_second_order_of_its_loads():
 def test_pressure_on_parts_is_that_on_the_whole():
     one, two = (deflection(clamped(body, **pressed(0.5 * CRITICAL, True))) for body in (column(), column(2)))
     assert two == pytest.approx(one, rel=1e-3)
+
+
+def test_the_integrals_of_a_load_are_found_once(monkeypatch):
+    counted, whole = [], fd.Pressure.integrals
+    monkeypatch.setattr(fd.Pressure, "integrals", lambda self, body: counted.append(body) or whole(self, body))
+    fd.static(clamped(column(), **pressed(0.5 * CRITICAL, follower=True)))
+    assert 1 <= len(counted) < 10  # of forms of the body, and not of the differences of every tangent
