@@ -61,7 +61,7 @@ def _reactions(at: Evaluator) -> Array:
 
 
 def _applied(at: Evaluator, time: float, x: Array, v: Array) -> Array:
-    """(M, 6) forces and moments of the applied loads at all markers; those spread over surfaces have no second order."""
+    """(M, 6) forces and moments of the applied loads at all markers; there are no matrices for those spread over surfaces."""
     scene, place = at.system.scene, at.system.layout
     out = np.zeros((len(markers(scene)), 6))
     for force, load in zip(forces_of(scene), applied(scene, place, time, x, v), strict=True):

@@ -17,6 +17,8 @@ import numpy as np
 
 from ffr_dyn.functions.rotation import cross, from_vector, product, rotation_matrix, tangent
 from ffr_dyn.scene.force_kinds import in_bases
+from ffr_dyn.scene.forces.distributed import moving_model
+from ffr_dyn.scene.forces.places import OnBody
 from ffr_dyn.scene.own_frame import OwnFrame
 from ffr_dyn.scene.scene import Body, Scene, altered, used_interfaces
 from ffr_dyn.variants.families import by_family
@@ -114,10 +116,13 @@ def _unknown(model: FlexibleBody) -> frozenset[str]:
 def with_mean_axis_bodies(scene: Scene) -> Scene:
     """The scene with second-order bodies that are theirs in the mean-axis form: its frame and modes are those of its results.
 
-    Raises InputError as `in_mean_axis_frames`.
+    The surfaces on which loads act keep their second-order displacement. Raises InputError as `in_mean_axis_frames`.
     """
     converted = in_mean_axis_frames(scene)
-    return replace(converted, bodies=tuple(replace(body, frame=None) for body in converted.bodies))
+    loaded = {force.place.body for force in converted.forces if isinstance(force.place, OnBody)}
+    models = [moving_model(body) if body.name in loaded else body.model for body in converted.bodies]
+    bodies = zip(converted.bodies, models, strict=True)
+    return replace(converted, bodies=tuple(replace(body, model=model, frame=None) for body, model in bodies))
 
 
 def in_new_frames(scene: Scene) -> tuple[Scene, list[str]]:

@@ -16,7 +16,7 @@ from ffr_prep.body.damping import Damping, damped, with_damping
 from ffr_prep.body.fewer_modes import truncated
 from ffr_prep.body.file import content_hash, load_body, save_arrays, save_body, surface_arrays, surface_of
 from ffr_prep.body.frame_change import interface_motions, mass_of_motions
-from ffr_prep.body.mean_axis import FrameMarker, MeanAxisForm, idle_loads, mean_axis_form
+from ffr_prep.body.mean_axis import FrameMarker, MeanAxisForm, idle_loads, mean_axis_form, mean_axis_surface
 from ffr_prep.body.mesh_error import MESH_ERROR, mesh_doubt, mesh_errors_of
 from ffr_prep.body.movable import immovable
 from ffr_prep.body.reduced import (
@@ -86,6 +86,7 @@ __all__ = [
     "load_body",
     "mass_of_motions",
     "mean_axis_form",
+    "mean_axis_surface",
     "mesh_doubt",
     "mesh_errors_of",
     "of_fewer_shapes",

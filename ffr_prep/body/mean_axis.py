@@ -28,6 +28,7 @@ from ffr_prep.body.frame_change import (
     stiffening_in,
 )
 from ffr_prep.body.reduced import FlexibleBody, Interface, Surface
+from ffr_prep.body.turned_surface import turned_surface
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.brief import Brief
 from ffr_prep.common.errors import ComputationError, InputError
@@ -113,9 +114,17 @@ def _with_frame(body: FlexibleBody) -> FlexibleBody:
 
 
 def _surface(surface: Surface, Z: Array) -> Surface:
-    """Without the second-order displacement, which is for pictures: they are drawn in the frame that the body had."""
+    """Without the second-order displacement: pictures are drawn in the frame that the body had, and few bodies have loads
+    over their surface, for which `mean_axis_surface` has it."""
     arms = np.einsum("akm,pm->pka", turns(), surface.points)
     return recombined(replace(surface, second=None), Z[6:], Z[:3] + arms @ Z[3:6] + surface.Phi @ Z[6:])
+
+
+def mean_axis_surface(body: FlexibleBody, made: FlexibleBody, C: Array) -> Surface | None:
+    """The surface of the mean-axis form `made` of a body, with its second-order displacement; q of the body are C q."""
+    M = mass_of_motions(body)
+    Z = np.vstack([np.linalg.solve(M[:6, :6], -M[:6, 6:]) @ C, C])
+    return turned_surface(body, Z, made.omega2, made.stiffening)
 
 
 def _motions(body: FlexibleBody) -> tuple[Array, Array]:

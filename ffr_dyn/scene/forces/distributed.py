@@ -5,12 +5,13 @@ A body's surface has points u = u_0 + Phi q (body axes). Nodal forces f_p do the
     sum_p f_p . delta(R + A u_p)    so that    F = sum f_p,   M = sum u_p x f_p,   Q = sum Phi_p^T f_p
 
 with f_p in body axes and M about the body's origin: the rigid resultant and the modal forces belong together (Shabana 2013,
-sec. 5.6). These loads do no work on the second-order displacement of the body.
+sec. 5.6). The points of a second-order body move by u_2(q) as well, on which the forces work: they stiffen or buckle the body
+as forces at its interfaces do. With X = sum of d^2 u_2p / dq^2 f_p^T, (3, 3, n, n), the sum of u_2p f_p^T is q^T X q / 2.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -18,8 +19,8 @@ import numpy as np
 from ffr_dyn.scene.forces.force import LawNumbers, LoadTable, Moment
 from ffr_dyn.scene.forces.given import is_number
 from ffr_dyn.scene.forces.places import FACTOR, Measured
-from ffr_dyn.scene.scene import Scene
-from ffr_prep.body import FlexibleBody, Surface, axial
+from ffr_dyn.scene.scene import Body, Scene
+from ffr_prep.body import FlexibleBody, Surface, axial, mean_axis_surface, remembered
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 
@@ -29,35 +30,56 @@ _MOST_ARROWS = 16  # of a load
 
 @dataclass(frozen=True)
 class Affine:
-    """Generalised forces constant + slope q in body axes: constant (6 + n,), slope (6 + n, n)."""
+    """Generalised forces constant + slope q in body axes: constant (6 + n,), slope (6 + n, n).
+
+    second : (3, 3, n, n) X of the forces that are constant; None of a linear body
+    """
 
     constant: Array
     slope: Array
+    second: Array | None = None
 
     def at(self, q: Array, A: Array) -> Array:
         """(6 + n,) generalised forces."""
         forces: Array = self.constant + self.slope @ q
+        if self.second is not None:
+            forces[3:6] += axial(0.5 * self.second @ q @ q)
+            forces[6:] += np.trace(self.second) @ q
         return forces
 
     def numbers(self) -> Array:
-        return np.concatenate([self.constant, self.slope.ravel()])
+        return _with_second(self.second, self.constant, self.slope)
 
 
 @dataclass(frozen=True)
 class Spread:
-    """Forces of fixed global direction: force (3,), sum of u_0 f^T (3, 3), sum of phi_j f^T (3, 3, n); f global."""
+    """Forces of fixed global direction: force (3,), sum of u_0 f^T (3, 3), sum of phi_j f^T (3, 3, n); f global.
+
+    second : (3, 3, n, n) X; None of a linear body
+    """
 
     force: Array
     u_f: Array
     phi_f: Array
+    second: Array | None = None
 
     def at(self, q: Array, A: Array) -> Array:
         """(6 + n,) generalised forces."""
-        u_f = (self.u_f + self.phi_f @ q) @ A
-        return np.concatenate([self.force @ A, axial(u_f), np.einsum("klj,lk->j", self.phi_f, A)])
+        by_q = self.phi_f @ q
+        phi_f = self.phi_f
+        if self.second is not None:
+            by_q, phi_f = by_q + 0.5 * self.second @ q @ q, phi_f + self.second @ q
+        u_f = (self.u_f + by_q) @ A
+        return np.concatenate([self.force @ A, axial(u_f), np.einsum("klj,lk->j", phi_f, A)])
 
     def numbers(self) -> Array:
-        return np.concatenate([self.force, self.u_f.ravel(), self.phi_f.ravel()])
+        return _with_second(self.second, self.force, self.u_f, self.phi_f)
+
+
+def _with_second(second: Array | None, *parts: Array) -> Array:
+    """Whether there is a second order (1 or 0), the parts, and its numbers."""
+    there = [] if second is None else [second.ravel()]
+    return np.concatenate([[float(second is not None)], *(one.ravel() for one in parts), *there])
 
 
 # Of every kind whose `integrals(model)` are these, with a place on a body and a `function` of time.
@@ -70,14 +92,48 @@ def check_integrals(force: Any, scene: Scene) -> None:
 
 def law_of_integrals(force: Any, now: Moment, c: Any, rate: Any) -> Any:
     """(6 + n,) generalised forces: a function of time times the integrals."""
-    made: Affine | Spread = force.integrals(force.place.of(now.state.scene).model)
-    return now.value(force.function)[0] * made.at(c, now.state.axes(force.body))
+    return now.value(force.function)[0] * _integrals(force, now.state.scene).at(c, now.state.axes(force.body))
 
 
 def compiled_integrals(force: Any, table: LoadTable) -> LawNumbers:
     """The numbers that the kernel of distributed loads reads."""
-    made: Affine | Spread = force.integrals(force.place.of(table.scene).model)
-    return LawNumbers(made.numbers(), table.function(force.function))
+    return LawNumbers(_integrals(force, table.scene).numbers(), table.function(force.function))
+
+
+class _This:
+    """A force as a key: itself, and no other of equal values, which arrays do not tell."""
+
+    def __init__(self, force: Any) -> None:
+        self.force = force
+
+    def __hash__(self) -> int:
+        return id(self.force)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _This) and other.force is self.force
+
+
+def _integrals(force: Any, scene: Scene) -> Affine | Spread:
+    """Those of the body as it moves in the scene, found once: laws are asked thousands of times."""
+    model = moving_model(force.place.of(scene))
+    made: Affine | Spread = remembered(model, _This(force), lambda: force.integrals(model))
+    return made
+
+
+def moving_model(body: Body) -> FlexibleBody:
+    """The body with the second-order displacement that its surface has in the scene: in its mean-axis frame, or none."""
+    return remembered(body.model, ("moving", body.stiffening, body.frame is None), lambda: _moving(body))
+
+
+def _moving(body: Body) -> FlexibleBody:
+    model = body.model
+    if model.surface is None or (body.frame is None and model.surface.second is None):
+        return model
+    if model.stiffening is None or not body.stiffening:
+        return replace(model, surface=replace(model.surface, second=None))
+    if body.frame is None:
+        return model
+    return replace(model, surface=mean_axis_surface(body.frame.model, model, body.frame.C))
 
 
 def measured_factor(force: Any) -> tuple[Measured, ...]:
@@ -125,6 +181,17 @@ def affine(u: Array, Phi: Array, f: Array, slope: Array) -> Affine:
             np.einsum("pki,pkj->ij", Phi, slope),
         ]),
     )  # fmt: skip
+
+
+def second_order(surface: Surface, points: Array, f: Array) -> Array | None:
+    """(3, 3, n, n) X of forces f (N, 3) on the points (N,) of a surface; None where its second order was not computed."""
+    if surface.second is None:
+        return None
+    loaded, of = np.unique(points, return_inverse=True)
+    total = np.zeros((len(loaded), 3))
+    np.add.at(total, of, f)
+    by_rank = np.tensordot(total, surface.second.shapes[loaded], (0, 0))  # (l, k, r)
+    return np.tensordot(by_rank, surface.second.weights, 1).swapaxes(0, 1)
 
 
 def surface_of(body: FlexibleBody, name: str) -> Surface:

@@ -24,6 +24,7 @@ from ffr_dyn.scene.forces.distributed import (
     law_of_integrals,
     measured_factor,
     numbers_at,
+    second_order,
     surface_of,
 )
 from ffr_dyn.scene.forces.force import Force
@@ -113,9 +114,10 @@ class NodalForces(Force):
         surface = surface_of(body, self.name)
         _check_points(self, body, surface)
         u, Phi, f = surface.points[self.points], surface.Phi[self.points], self.forces
+        second = second_order(surface, self.points, f)
         if self.axes == "body":
-            return affine(u, Phi, f, np.zeros((*f.shape, body.n)))
-        return Spread(f.sum(0), u.T @ f, np.einsum("pkj,pl->klj", Phi, f))
+            return replace(affine(u, Phi, f, np.zeros((*f.shape, body.n))), second=second)
+        return Spread(f.sum(0), u.T @ f, np.einsum("pkj,pl->klj", Phi, f), second)
 
 
 def _check_points(force: NodalForces, body: FlexibleBody, surface: Surface) -> None:

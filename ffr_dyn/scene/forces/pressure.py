@@ -23,6 +23,7 @@ from ffr_dyn.scene.forces.distributed import (
     law_of_integrals,
     measured_factor,
     numbers_at,
+    second_order,
     surface_of,
 )
 from ffr_dyn.scene.forces.force import Force
@@ -129,7 +130,12 @@ class Pressure(Force):
         f = share[:, :, None] * area[:, None]
         slope = share[:, :, None, None] * area_q[:, None] * (1.0 if self.follower else 0.0)
         count, n = 3 * len(corners), body.n
-        return affine(u.reshape(count, 3), Phi.reshape(count, 3, n), f.reshape(count, 3), slope.reshape(count, 3, n))
+        made = affine(u.reshape(count, 3), Phi.reshape(count, 3, n), f.reshape(count, 3), slope.reshape(count, 3, n))
+        second = second_order(surface, corners.ravel(), f.reshape(count, 3))
+        if self.follower and second is not None:
+            # Area and normal are of first order: so is the moment. The symmetric part has the work, and no moment.
+            second = 0.5 * (second + second.swapaxes(0, 1))
+        return replace(made, second=second)
 
     def _at_points(self, body: FlexibleBody, surface: Surface) -> Array:
         size = len(surface.points)
