@@ -14,11 +14,12 @@ from ffr_dyn.compile.force_tables import Callback
 from ffr_dyn.compile.scene_tables import System, of_time
 from ffr_dyn.functions.breaks import begins
 from ffr_dyn.functions.fast_changes import Changes, Made, divisions, fast_changes, made_of, slow
+from ffr_dyn.functions.poles import pole
 from ffr_dyn.functions.time_functions import USER
 from ffr_dyn.kernels.functions import sample_functions
 from ffr_dyn.kernels.tables import SINCE, UNTIL
 from ffr_prep.common.arrays import Array
-from ffr_prep.common.errors import ComputationError
+from ffr_prep.common.errors import ComputationError, InputError
 
 PARTS = 4  # of a span over which a function is a cubic, for the step that is asked for
 CALLS = 8  # of a Python function in a step, about, before a run,
@@ -26,6 +27,7 @@ FEWEST_CALLS, MOST_CALLS = 4_000, 100_000  # and in all, and again as many where
 ASIDE = 1e-5  # of a step, at which it is called for its rate
 MOST_ROWS = 100_000  # times from which the search begins
 MOST = 1_000_000  # parts of steps
+SHARP = 1e-7  # of a step: what changes within less may be a pole
 BESIDE = 1e-9  # of a step, by which its parts are longer
 NAMES, TIMES = 3, 3  # in a text
 
@@ -70,7 +72,8 @@ def fast_of(system: System, start: float, end: float, output_step: float, step: 
     """What functions of time do within steps [s] from `start` to `end`; None where they do nothing there.
 
     A Python function that changes all the time, as noise does, is left as it is called.
-    Raises ComputationError where functions that are written change many times in every step.
+    Raises ComputationError where functions that are written change many times in every step, InputError where one of them
+    grows without bound.
     """
     functions = system.model.functions
     made = made_of(functions.kind, functions.start, functions.data, system.model.rows.function, functions.switches)
@@ -78,6 +81,7 @@ def fast_of(system: System, start: float, end: float, output_step: float, step: 
         return None  # what is no span the run tells
     rows = np.linspace(start, end, 1 + int(np.clip(round((end - start) / output_step), 1, MOST_ROWS)))
     found = _with_python(system, made, rows, step) or _written(system, made, rows, step)
+    _refuse_poles(system, made, found, (start, end, step))
     names = dict.fromkeys(name for name, fast in zip(system.purposes, found.which, strict=True) if fast)
     changes = len(found.spans) + len(found.jumps) + len(found.switches)
     return Fast(found.spans, tuple(names), found.jumps, found.switches, step) if changes else None
@@ -93,6 +97,21 @@ def _written(system: System, made: Made, rows: Array, step: float) -> Changes:
             "cannot be divided as it asks for; take a shorter step, or leave out of it what is too fast to matter"
         )
     return found
+
+
+def _refuse_poles(system: System, made: Made, found: Changes, span: tuple[float, float, float]) -> None:
+    """Raises InputError where a function that is not Python's has a pole; span : start, end and step [s]."""
+    start, end, step = span
+    narrow = found.spans[found.spans[:, 1] - found.spans[:, 0] < SHARP * step]
+    breaks = system.model.functions.breaks[:, [UNTIL, SINCE]]
+    times = np.concatenate([0.5 * ends.sum(axis=1) for ends in (narrow, found.jumps, breaks)])
+    sample = partial(_sampled, system, partial(_no_python, system))
+    at = pole(sample, made.roots, times[(times >= start) & (times <= end)], step)
+    if at:
+        raise InputError(
+            f"{system.purposes[at[1]]}: the function of time grows without bound at t = {at[0]:.6g} s, which no step "
+            "resolves; limit it there, as 1 / sqrt(t**2 + 0.01**2) does 1 / abs(t), or end the run before"
+        )
 
 
 def _with_python(system: System, made: Made, rows: Array, step: float) -> Changes | None:

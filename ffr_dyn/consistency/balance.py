@@ -1,9 +1,9 @@
 """Whether forces and drivers account for the energy of a run, both ways: what has come, and what has gone.
 
-Kinetic, strain and gravity energy and that of undamped springs change by the work of all other forces, of drivers and of
-modal damping. The work is the trapezoid of their powers at the rows; what rows cannot tell of it is known by how much the
-powers bend from row to row, and nothing is said that is less than that. Between rows where a function of time breaks, or
-comes and goes, powers at rows tell nothing, and what the energy changes by is taken for work.
+Kinetic, strain and gravity energy and that of undamped springs and stops change by the work of all other forces, of
+drivers and of modal damping. The work is the trapezoid of their powers at the rows; what rows cannot tell of it is known by
+how much the powers bend from row to row, and nothing is said that is less than that. Between rows where a function of time
+breaks, or comes and goes, powers at rows tell nothing, and what the energy changes by is taken for work.
 """
 
 from __future__ import annotations
@@ -20,20 +20,22 @@ from ffr_dyn.results.recorded_motion import View
 from ffr_dyn.scene.force_kinds import forces_of
 from ffr_dyn.scene.forces import JointStop
 from ffr_dyn.scene.forces.force import Force
+from ffr_dyn.scene.forces.places import COORDINATE, RATE
 from ffr_prep.common.arrays import Array
 
 AMISS = 0.1  # of the largest kinetic, strain and spring energy: from where it is told
 SURE = 3.0  # times what rows leave open of the work
 QUIET = 1e-6  # m^2/s^2, twice the energy by mass that is not looked at
 # Numbers of an account [s], [J], [W]: see `Account`.
-TIME, BEGUN, WORK, OPEN, MOST, WORST, WHEN, POWER, BEFORE, TOTAL = range(10)
+TIME, BEGUN, WORK, OPEN, MOST, WORST, WHEN, POWER, BEFORE, TOTAL, AT_STOPS, BESIDE = range(12)
+REACHED = 2.0  # times the steps from row to row: where a stop is as near, it may be met between them
 
 
 @dataclass(frozen=True)
 class Account:
     """The account of the energy of a run: the rows so far.
 
-    numbers : (10,) time of the last row, energy at the start, work since, what rows leave open of it, largest energy of
+    numbers : (12,) time of the last row, energy at the start, work since, what rows leave open of it, largest energy of
               motion and strain, largest difference between energy and work, its time, power of the last row and of the one
               before, energy of the last row
     moments : (K,) [s] at which functions of time change between rows, beside those that they break at
@@ -41,7 +43,7 @@ class Account:
 
     system: System
     moments: Array = field(default_factory=lambda: np.zeros(0))
-    numbers: Array = field(default_factory=lambda: np.full(10, np.nan))
+    numbers: Array = field(default_factory=lambda: np.full(12, np.nan))
 
 
 def add_rows(account: Account, rows: Record, powers: Array) -> Array:
@@ -54,22 +56,28 @@ def add_rows(account: Account, rows: Record, powers: Array) -> Array:
     own = rows.energy[:, 0] + rows.energy[:, 1]
     energy, total = own + np.abs(stored), own + stored + rows.energy[:, 2]  # that of a negative stiffness is below zero
     if np.isnan(numbers[TIME]):
-        numbers[:] = [rows.time[0], total[0], 0.0, 0.0, energy[0], 0.0, rows.time[0], power[0], power[0], total[0]]
+        numbers[:] = 0.0
+        numbers[[TIME, BEGUN, MOST, WHEN, TOTAL]] = rows.time[0], total[0], energy[0], rows.time[0], total[0]
+        numbers[[POWER, BEFORE]] = power[0]
     times = np.append(numbers[TIME], rows.time)
     steps = times[1:] - times[:-1]
     known = np.concatenate([numbers[[BEFORE, POWER]], power])
     seen = ~_breaks_between(account, times)
     grown = np.diff(total, prepend=numbers[TOTAL])
     work = numbers[WORK] + np.cumsum(np.where(seen, 0.5 * steps * (known[1:-1] + known[2:]), grown))
-    left_open = numbers[OPEN] + np.cumsum(steps * _left_open(known) * seen)
+    unsure = steps * _left_open(known) * seen
+    left_open = numbers[OPEN] + np.cumsum(unsure)
     left = total - numbers[BEGUN] - work
+    lost = np.abs(np.diff(left, prepend=numbers[TOTAL] - numbers[BEGUN] - numbers[WORK]))
+    near = np.append(numbers[BESIDE] > 0, _beside_stops(system, rows, steps))
+    numbers[AT_STOPS] += float(lost[(lost > SURE * unsure) & (near[:-1] | near[1:])].sum())
     sure = np.where(np.abs(left) > SURE * left_open, left, 0.0)
     worst = int(np.argmax(np.abs(sure)))
     if abs(sure[worst]) > abs(numbers[WORST]):
         numbers[[WORST, WHEN]] = sure[worst], rows.time[worst]
     numbers[MOST] = max(numbers[MOST], float(energy.max()))
     numbers[[TIME, WORK, OPEN, POWER, BEFORE]] = rows.time[-1], work[-1], left_open[-1], known[-1], known[-2]
-    numbers[TOTAL] = total[-1]
+    numbers[[TOTAL, BESIDE]] = total[-1], near[-1]
     return left
 
 
@@ -81,14 +89,30 @@ def _breaks_between(account: Account, times: Array) -> Array:
     return found
 
 
+def _beside_stops(system: System, rows: Record, steps: Array) -> Array:
+    """(T,) whether an undamped stop may be met in about the steps [s] from row to row that end at each."""
+    view, met = View(system, rows), np.zeros(rows.time.size, dtype=bool)
+    for k, force in enumerate(forces_of(system.scene)):
+        if isinstance(force, JointStop) and _conserves(force):
+            c, reach = measured_values(view, k, COORDINATE), REACHED * steps * np.abs(measured_values(view, k, RATE))
+            met |= force.energy(c - reach) + force.energy(c + reach) > 0
+    return met
+
+
+def unresolved_rebounds(account: Account) -> bool:
+    """Whether bodies have come from undamped stops with another energy than they met them with."""
+    most, at_stops = account.numbers[[MOST, AT_STOPS]]
+    return bool(at_stops > AMISS * most and amiss(account, "", ""))
+
+
 def amiss(account: Account, method: str, remedy: str) -> list[str]:
     """Notes on energy of a run that has no source, or has gone nowhere; `remedy` is a sentence without its end."""
     scene, (most, worst, when) = account.system.scene, account.numbers[[MOST, WORST, WHEN]]
     least = QUIET * sum(body.model.mass for body in scene.bodies)
     if not abs(worst) > max(AMISS * most, least) or (account.system.model.base >= 0).any():
         return []
-    if any(isinstance(force, JointStop) for force in forces_of(scene)):
-        return []  # an impact may fall between two rows
+    if any(isinstance(force, JointStop) and not _conserves(force) for force in forces_of(scene)):
+        return []  # an impact that takes energy may fall between two rows
     way = (
         "has come that no force or driver has put in" if worst > 0 else "has gone that no force or driver has taken out"
     )
@@ -107,7 +131,7 @@ def _left_open(known: Array) -> Array:
 
 
 def _stored(system: System, rows: Record) -> Array:
-    """(T,) [J] in springs without damping."""
+    """(T,) [J] in springs and stops without damping."""
     view, total = View(system, rows), np.zeros(rows.time.size)
     for k, force in enumerate(forces_of(system.scene)):
         if _conserves(force):

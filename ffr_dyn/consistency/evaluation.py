@@ -180,7 +180,8 @@ def total_mass_matrix(scene: Scene, place: Layout, x: Array) -> Array:
 
 
 def evaluated_mass_matrix(at: Evaluator) -> Array:
-    """(V, V) mass matrix at the state evaluated last, from what the kernels keep of it."""
+    """(V, V) mass matrix at the state evaluated last, from what the kernels keep of it; in a plane motions across it, of
+    which they keep but a part, have an inertia of their own."""
     place, bodies, work = at.system.layout, at.system.model.bodies, at.work.bodies
     M = np.zeros((place.v_size, place.v_size))
     for b, n in enumerate(place.n):
@@ -194,6 +195,10 @@ def evaluated_mass_matrix(at: Evaluator) -> Array:
             coupling = np.concatenate([P, H]).reshape(6, n)
             M[rigid, elastic], M[elastic, rigid] = coupling, coupling.T
             M[elastic, elastic] = np.eye(n)
+    across = locked(place)
+    own = M[across, across]
+    M[across], M[:, across] = 0.0, 0.0
+    M[across, across] = own
     return M
 
 

@@ -20,7 +20,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ffr_dyn.consistency.assemble import Assembled
-from ffr_dyn.consistency.evaluation import Evaluator, OpenError, accelerations, closed, evaluate, evaluator
+from ffr_dyn.consistency.evaluation import (
+    Evaluator,
+    OpenError,
+    accelerations,
+    closed,
+    evaluate,
+    evaluator,
+    total_mass_matrix,
+)
 from ffr_dyn.consistency.unresolved import Vibrations, vibrations
 from ffr_dyn.equations.layout import moved, to_body_axes, to_global_axes
 from ffr_prep.common.arrays import Array
@@ -29,6 +37,8 @@ from ffr_prep.common.errors import ComputationError
 ITERATIONS = 40
 TOLERANCE, ROUNDING = 1e-12, 1e-9  # of a step, and of one that gets no shorter, relative to the deflection or to
 LEAST = 1e-9  # sqrt(kg) m, where there is none
+FAINT = 1e-4  # of what turning would deflect if it strained all of the mass: deflections that are less count as that
+NOTHING = 1e-8  # of the same: rates that are rounding
 SLOW = 0.3  # a step of this part of the one before asks for the tangent
 APART = 0.1  # of the times of the differences: over the lowest omega, and rad of a turn
 PASSES = 2
@@ -52,13 +62,17 @@ class _Motion:
 
 @dataclass(frozen=True)
 class _Search:
-    """A scene with its vibrations, numbers (N,) of the elastic velocities and positions, and Omega^2 (N,)."""
+    """A scene with its vibrations, numbers (N,) of the elastic velocities and positions, and Omega^2 (N,).
+
+    inertial : [sqrt(kg) m] what turning would deflect if it strained all of the mass
+    """
 
     at: Evaluator
     of: Vibrations
     elastic: Array
     places: Array
     omega2: Array
+    inertial: float
 
     def amplitudes(self, q: Array) -> Array:
         """(k,) of the vibrations in deflections, their rates or accelerations (N,), nearest in strain energy."""
@@ -84,13 +98,14 @@ def quasi_static(assembled: Assembled, time: float) -> Assembled:
         return assembled
     try:
         x, v, slow = _slow(_search(assembled, of), time, assembled.x, assembled.v, _apart(assembled, of))
-    except (OpenError, np.linalg.LinAlgError):
-        raise _failed(time) from None
+    except (OpenError, ComputationError, np.linalg.LinAlgError):
+        raise _failed(time, of) from None
     notes = [*assembled.notes, "starts with the quasi-static deflections of the motion"]
     if not slow:
         notes.append(
             f"the motion at the start is not slow beside the lowest vibration, {of.omega[0] / 2 / np.pi:.4g} Hz: "
             "there are no deflections that follow it without vibration, and those of the start do so roughly"
+            + _evenly(of)
         )
     return replace(assembled, x=x, v=v, notes=tuple(notes))
 
@@ -107,21 +122,41 @@ def _slow(search: _Search, time: float, x: Array, v: Array, h: float) -> tuple[A
             return x, v, False
     derivatives = x[search.places], motion.rate, motion.acceleration, motion.third, motion.fourth
     sizes = [np.linalg.norm(search.amplitudes(q) / search.of.omega**k) for k, q in enumerate(derivatives)]
-    return x, v, bool(sizes[2] <= SMALL * (sizes[0] + sizes[1]) or sizes[3] + sizes[4] <= SMALL * sizes[2])
+    still = max(sizes[2:]) <= NOTHING * search.inertial
+    return x, v, bool(still or sizes[2] <= SMALL * (sizes[0] + sizes[1]) or sizes[3] + sizes[4] <= SMALL * sizes[2])
 
 
-def _failed(time: float) -> ComputationError:
+def _failed(time: float, of: Vibrations) -> ComputationError:
     return ComputationError(
         f"at t = {time:.6g} s no quasi-static deflections were found: the load bends a body too far, or is near to "
-        'buckling it, or forces jump; begin "as-given"'
+        f"buckling it, or forces jump, or the motion is as fast as the lowest vibration, {of.omega[0] / 2 / np.pi:.4g} Hz; "
+        f'begin "as-given"{_evenly(of)}'
     )
+
+
+def _evenly(of: Vibrations) -> str:
+    """What else there is for machines that are driven."""
+    driven = of.assembled.system.scene.drivers
+    return ', or, where drivers turn evenly, with begin = "steady" or "periodic"' if driven else ""
+
+
+def _inertial(assembled: Assembled, of: Vibrations) -> float:
+    """[sqrt(kg) m] what turning would deflect if it strained all of the mass."""
+    scene, place = assembled.system.scene, assembled.system.layout
+    inside = to_body_axes(place, assembled.x, assembled.v)
+    twice_energy = float(inside @ total_mass_matrix(scene, place, assembled.x) @ inside)
+    return float(np.sqrt(twice_energy)) * _turning(assembled) / float(of.omega[0]) ** 2
+
+
+def _turning(assembled: Assembled) -> float:
+    """[rad/s] of the body that turns fastest."""
+    place = assembled.system.layout
+    return max(float(np.linalg.norm(assembled.v[place.omega(b)])) for b in range(len(place.n)))
 
 
 def _apart(assembled: Assembled, of: Vibrations) -> float:
     """[s] between the times of the differences."""
-    place = assembled.system.layout
-    turning = max(float(np.linalg.norm(assembled.v[place.omega(b)])) for b in range(len(place.n)))
-    return APART / max(float(of.omega[0]), turning)
+    return APART / max(float(of.omega[0]), _turning(assembled))
 
 
 def _search(assembled: Assembled, of: Vibrations) -> _Search:
@@ -130,7 +165,7 @@ def _search(assembled: Assembled, of: Vibrations) -> _Search:
     elastic = np.concatenate([np.arange(place.q_dot(b).start, place.q_dot(b).stop) for b in numbers])
     places = np.concatenate([np.arange(place.q(b).start, place.q(b).stop) for b in numbers])
     omega2 = np.concatenate([body.model.omega2 for body in bodies])
-    return _Search(evaluator(assembled.system), of, elastic, places, omega2)
+    return _Search(evaluator(assembled.system), of, elastic, places, omega2, _inertial(assembled, of))
 
 
 def _settled(
@@ -142,7 +177,8 @@ def _settled(
         x, v = _with_rates(search, time, x, v, motion.rate)
         step = -np.linalg.solve(tangent, search.too_much(time, x, v, motion.acceleration))
         size = float(np.linalg.norm(step))
-        least, slow = max(float(np.linalg.norm(x[search.places])), LEAST), size > SLOW * before
+        least = max(float(np.linalg.norm(x[search.places])), LEAST, FAINT * search.inertial)
+        slow = size > SLOW * before
         if size <= (ROUNDING if slow else TOLERANCE) * least:
             return x, v, tangent
         if slow:
@@ -150,7 +186,7 @@ def _settled(
         else:
             x = moved(search.at.system.layout, x, search.of.motions @ step)
         before = size
-    raise _failed(time)
+    raise _failed(time, search.of)
 
 
 def _with_rates(search: _Search, time: float, x: Array, v: Array, rate: Array) -> tuple[Array, Array]:

@@ -127,6 +127,11 @@ def run(
     """
     kept = (*needed(of, made.assembled.system), *_states(made.scene), *outputs)
     result = simulated(made, choice, span, kept, method=method, say=say)
+    if "rebounds" in result.attributes:  # runs that lose them agree, and tell no error of it
+        raise ComputationError(
+            f"steps of {span.output_step / choice.divisions:.3g} s are too long for the stops that bodies "
+            "rebound from; take a shorter output_step, or softer stops"
+        )
     with np.errstate(over="ignore", invalid="ignore"):  # told below
         values = histories(of, made.scene, result)
     for output, one in zip(of.outputs, values, strict=True):

@@ -19,8 +19,10 @@ from ffr_dyn.economy.cost import STAGES
 from ffr_dyn.economy.model_choice import Choice
 from ffr_dyn.economy.outputs import difference, largest, ranges
 from ffr_dyn.economy.policy import DEFAULT, Policy
+from ffr_dyn.economy.rigid_start import least
 from ffr_dyn.economy.run import Span, Trial, rings
 from ffr_dyn.integrators import CONTROLLED, METHODS, RK4, Integrator
+from ffr_dyn.scene.force_kinds import forces_of
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError, InputError
 
@@ -62,7 +64,7 @@ def chosen_step(ledger: Ledger, choice: Choice, limit: Array) -> Stepped:
     ledger.tell("integrator and step")
     found = _rigid_in_two_stages(ledger, choice, limit)
     if found is None:
-        coarse = ledger.run(choice)
+        coarse = least(ledger.run, choice, choice.divisions, ledger.policy)
         found = _coarse(ledger, coarse, limit) or _finer(ledger, coarse, limit)
     return _longer(ledger, found, limit)
 
@@ -143,7 +145,7 @@ def _finer(ledger: Ledger, coarse: Trial, limit: Array) -> Stepped:
     """The cheaper of the methods by what they are predicted to need, run with that, where the coarse run does not do."""
     error = None if _far_off(ledger, coarse, limit) else _from_two_rows(ledger, coarse)
     if error is None:
-        error = signed(coarse, ledger.run(replace(coarse.choice, divisions=2 * coarse.choice.divisions)))
+        error = signed(coarse, _shorter(ledger, coarse.choice))
         if share(error, limit) <= 1:
             return Stepped(coarse, error)
     now = share(error, limit)
@@ -230,7 +232,7 @@ def measured(ledger: Ledger, trial: Trial) -> Histories:
     error = _from_two_rows(ledger, trial)
     if error is not None:
         return error
-    return signed(trial, ledger.run(replace(trial.choice, divisions=2 * trial.choice.divisions)))
+    return signed(trial, _shorter(ledger, trial.choice))
 
 
 # ---- steps that the method chooses ------------------------------------------------------------------------------------
@@ -281,6 +283,11 @@ def _attempt(ledger: Ledger, choice: Choice) -> Trial | None:
         return None
 
 
+def _shorter(ledger: Ledger, choice: Choice) -> Trial:
+    """A run with half the step, or the longest below that which completes one, as between impacts on stops."""
+    return least(ledger.run, choice, 2 * choice.divisions, ledger.policy)
+
+
 def order(trial: Trial) -> int:
     """Order of the method of a run."""
     return order_of(trial.choice)
@@ -300,8 +307,11 @@ def error_of(fine: Trial, coarse: Trial) -> Histories:
 
 def _orders(trial: Trial, off: Histories) -> list[int]:
     """The order of the method, for each output; 1 where two steps are so far apart that none has set in, as after an impact
-    that they jump over (`ffr_dyn.consistency.step_error`)."""
+    that they jump over (`ffr_dyn.consistency.step_error`), and where the motion may change a force within a step: how much
+    of the step is before an impact is chance."""
     apart, sizes = largest(off), ranges(trial.values)
+    if any(force.sudden for force in forces_of(trial.scene)):
+        return [1] * len(sizes)
     return [1 if far > FAR * size > 0 else order(trial) for far, size in zip(apart, sizes, strict=True)]
 
 

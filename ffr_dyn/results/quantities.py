@@ -337,7 +337,7 @@ def _totals(system: System) -> Named:
     total = "kinetic, strain and gravity energy"
     yield "energy.total", _entry("J", (), total, lambda view: _sum(view.record.energy))
     if any(force.stores_energy for force in forces_of(system.scene)):
-        text = "energy stored in springs and bushings, preload included"
+        text = "energy stored in springs, bushings and stops, preload included"
         yield "energy.springs", _entry("J", (), text, spring_energy)
     texts = (("position", "m", "largest violation of a constraint row"), ("velocity", "m/s", "largest rate of a row"))
     for k, (name, unit, text) in enumerate(texts):

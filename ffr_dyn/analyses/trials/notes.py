@@ -69,8 +69,12 @@ def _at_least(errors: Mapping[str, StepError]) -> str:
 
 
 def _unseen(trial: Trial) -> list[str]:
-    """A note where what the steps damp is not in the errors."""
-    if not trial.errors or trial.twins or twin_share(trial.method) is None:
+    """A note where what the steps damp, or what stops give back, is not in the errors."""
+    if not trial.errors:
+        return []
+    if "rebounds" in trial.result.attributes:
+        return ["the error told leaves out rebounds from stops, for which the steps are too long; take a smaller step"]
+    if trial.twins or twin_share(trial.method) is None:
         return []
     return [
         "the error told leaves out vibration that the steps damp: the run that shows it has failed; take a smaller step"

@@ -13,6 +13,7 @@ from ffr_dyn.scene.force_kinds import register_force
 from ffr_dyn.scene.forces.checks import check_number, check_positive
 from ffr_dyn.scene.forces.force import Force, LawNumbers, LoadTable, Moment
 from ffr_dyn.scene.forces.places import OnJoint
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 
 
@@ -38,6 +39,7 @@ class JointStop(Force):
     kernel = "ffr_dyn.kernels.forces.stop:stop"
     acts = "one-sided spring-dampers beyond lower and upper"
     positive = "increases c"
+    stores_energy = True
     sudden = True
 
     name: str
@@ -77,6 +79,16 @@ class JointStop(Force):
         elastic = depth**2 / (2 * self.entry) if depth < self.entry else depth - self.entry / 2
         share = min(depth / self.entry, 1.0)
         return max(self.stiffness * elastic + self.damping * speed * share**2 * (3 - 2 * share), 0.0)
+
+    def energy(self, c: Array) -> Array:
+        below = np.zeros(len(c)) if self.lower is None else self._stored(self.lower - c)
+        return below if self.upper is None else below + self._stored(c - self.upper)
+
+    def _stored(self, depth: Array) -> Array:
+        entered = np.clip(depth, 0.0, self.entry)
+        beyond = np.maximum(depth - self.entry, 0.0)
+        found: Array = self.stiffness * (entered**3 / (6 * self.entry) + 0.5 * beyond * (beyond + self.entry))
+        return found
 
     @property
     def stiff_coordinates(self) -> tuple[int, ...]:

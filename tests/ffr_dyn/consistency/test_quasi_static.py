@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from planar_beam import planar_beam
 from test_dyn_plane import rod, slider_crank
 
 import ffr_dyn as fd
@@ -16,6 +17,10 @@ from ffr_dyn.consistency.assemble import assemble
 from ffr_dyn.consistency.evaluation import total_mass_matrix
 from ffr_dyn.consistency.quasi_static import quasi_static
 from ffr_dyn.equations.layout import to_body_axes
+from ffr_dyn.functions.time_functions import polynomial
+from ffr_dyn.scene.drivers import Driver
+from ffr_dyn.scene.joints import Joint
+from ffr_dyn.scene.scene import Body, Scene
 from ffr_prep.common.errors import InputError
 
 
@@ -126,3 +131,33 @@ def test_the_economiser_takes_a_model_for_runs_that_begin_so():
     assert found.settings.analysis.begin == "quasi-static"
     exact = fd.reference(scene, **how)["rod.b.position.x"]
     np.testing.assert_allclose(fd.run(found.scene, found.settings)["rod.b.position.x"], exact, rtol=0, atol=1e-8)
+
+
+def arm_in_a_plane(speed, gravity, plane):
+    """A slender beam whose root turns evenly; in a plane its inertia across it is not kept up."""
+    beam = planar_beam("arm", 1.0, 0.5, 50.0, 3)
+    hinge = Joint("hinge", "revolute", "ground.O", "arm.root")
+    motor = Driver("motor", "hinge", polynomial(0.0, speed))
+    body = Body("arm", beam, omega_bar=(0, 0, speed))
+    return Scene((body,), (hinge,), (motor,), ground={"O": (0, 0, 0)}, gravity=(0, -gravity, 0), plane=plane)
+
+
+def test_a_plane_has_the_deflections_of_space():
+    found = [quasi_static(assemble(arm_in_a_plane(10.0, 9.81, plane)), 0.0) for plane in ("auto", "none")]
+    flat, spatial = (one.x[one.system.layout.q(0)] for one in found)
+    np.testing.assert_allclose(flat, spatial, rtol=1e-6, atol=1e-9)
+    assert np.abs(flat).max() > 4e-3
+
+
+@pytest.mark.parametrize("speed", [0.0, 5.0, 20.0])
+def test_what_nothing_bends_is_slow(speed):
+    notes = quasi_static(assemble(arm_in_a_plane(speed, 0.0, "auto")), 0.0).notes
+    assert not any("not slow" in note for note in notes)
+
+
+def test_a_motion_that_is_too_fast_is_told_what_else_there_is():
+    notes = quasi_static(assemble(arm_in_a_plane(20.0, 9.81, "auto")), 0.0).notes
+    assert any(
+        "not slow" in note and note.endswith('where drivers turn evenly, with begin = "steady" or "periodic"')
+        for note in notes
+    )

@@ -63,6 +63,12 @@ def damped(method: object) -> Result:
     return run(replace(HINGED, gravity=(0, -9.81, 0), forces=(damper,)), method)
 
 
+def shoved(force: str) -> Result:
+    """By a function of time."""
+    scene = replace(HINGED, loads=(Load("push", "bar.b", (0, formula(force), 0)),))
+    return forward(scene, end=0.1, output_step=0.01, method=ROS2(1e-3), check=False)
+
+
 def tumbled(step: float) -> Result:
     """A free body that turns by hundreds of radians in the longer step."""
     fast = (replace(TUMBLING.bodies[0], omega_bar=(1e5, 2e5, 3e5)),)
@@ -325,6 +331,7 @@ OTHER = [
     Case(p(run, HUGE), p(run, HINGED)),
     Case(p(run, turned(1e200)), p(run, turned(1.0))),
     Case(p(run, HUGE, fd.AdaptiveROS3()), p(run, HINGED, fd.AdaptiveROS3())),
+    Case(p(shoved, "1 / abs(t - 0.05)"), p(shoved, "1 / sqrt((t - 0.05)**2 + 0.01**2)")),
     Case(p(damped, HalfExplicit(1e-3)), p(damped, ROS2(1e-3))),
     Case(p(tumbled, 1e-3), p(tumbled, 1e-8)),
     Case(lambda: run(locking(), RK4(1e-3), 0.5, stabilisation=Drifting()), lambda: run(locking(), RK4(1e-3))),

@@ -28,7 +28,7 @@ from ffr_dyn.economy.result import Economy
 from ffr_dyn.economy.search import economise
 from ffr_dyn.functions.formula import parse
 from ffr_dyn.integrators.stabilisation import Projection
-from ffr_dyn.scene.forces import Load, SpringDamper
+from ffr_dyn.scene.forces import JointStop, Load, SpringDamper
 from ffr_dyn.scene.scene import Body, Scene
 from ffr_dyn.scene_file.state_formula import StateFormula
 from ffr_dyn.variants.variant import basis_of, stiffening_by, vary, with_model, with_modes
@@ -39,6 +39,14 @@ SWING = replace(CLOUD, gravity=(0, -9.81, 0), plane="none", bodies=(Body("cloud"
 CORNER = ",".join(str(x) for x in SWING.bodies[0].model.surface.points[0])
 BARE = replace(SWING, bodies=(Body("cloud", replace(cloud(2), surface=None)),))
 TIP = "cloud.b.position.y"
+
+
+def fallen(stiffness: float) -> Economy:
+    """A bar that falls on a stop."""
+    stop = JointStop("stop", "hinge", stiffness=stiffness, entry=1e-6, lower=-0.1)
+    scene = replace(HINGED, gravity=(0, -9.81, 0), forces=(stop,))
+    return economise(scene, ["bar.b.position"], end=0.3, output_step=0.1, tolerance=0.1, verify=False)
+
 
 # ---- charts -------------------------------------------------------------------------------------------------------------
 
@@ -146,6 +154,7 @@ HELD = "cloud.a.position.y"
 SOON = (Event("end", lambda t, state: t - 0.03, stop=True),)
 LOUD = replace(SWING, bodies=(Body("cloud", stressed(cloud(2), 1e300)),))
 ECONOMY = [
+    Case(p(fallen, 1e16), p(fallen, 1e3)),
     asked((), (TIP,)),
     asked((f"{TIP}=little",), (f"{TIP}=1%",)),
     asked((TIP, TIP), (TIP,)),

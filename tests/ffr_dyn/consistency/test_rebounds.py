@@ -1,0 +1,88 @@
+"""Undamped stops give back what they take: where steps are too long for that, the error told is not known, and no model is
+chosen by it."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from ffr_dyn.analyses.forward import forward
+from ffr_dyn.analyses.run import run
+from ffr_dyn.economy.outputs import Output
+from ffr_dyn.economy.search import economise
+from ffr_dyn.integrators import ROS2, ROS3
+from ffr_dyn.scene.forces import JointStop
+from ffr_dyn.scene.joints import Joint
+from ffr_dyn.scene.scene import Body, Scene
+from ffr_prep.body import rigid_body
+
+END, ROW, ENTRY = 2.0, 0.01, 1e-4
+LOWEST = -np.pi / 3
+ARM = rigid_body(
+    "arm", mass=1.0, inertia=(1e-3, 0.0838, 0.0838), centre_of_mass=(0.5, 0, 0), points={"a": (0, 0, 0), "b": (1, 0, 0)}
+)
+
+
+def bouncing(stiffness, damping=0.0, lower=LOWEST):
+    """An arm that falls on a stop and rebounds."""
+    stop = JointStop("stop", "hinge", stiffness=stiffness, damping=damping, entry=ENTRY, lower=lower)
+    hinge = Joint("hinge", "revolute", "ground.O", "arm.a")
+    return Scene((Body("arm", ARM),), (hinge,), forces=(stop,), ground={"O": (0, 0, 0)}, gravity=(0, -9.81, 0))
+
+
+@cache
+def true(stiffness, row=ROW):
+    """(T,) angles, by another solver."""
+
+    def rates(t, y):
+        depth = max(LOWEST - y[0], 0.0)
+        push = stiffness * (depth**2 / (2 * ENTRY) if depth < ENTRY else depth - ENTRY / 2)
+        return [y[1], (push - 9.81 * 0.5 * np.cos(y[0])) / (0.0838 + 0.25)]
+
+    times = np.linspace(0, END, 1 + round(END / row))
+    return solve_ivp(rates, (0, END), [0, 0], t_eval=times, rtol=1e-9, atol=1e-12, max_step=2e-3).y[0]
+
+
+@pytest.mark.parametrize("method", [ROS3(1e-3), ROS2(1e-3)], ids=lambda one: type(one).__name__)
+def test_a_rebound_that_is_lost_is_told(method):
+    result = forward(bouncing(1e7), end=END, output_step=ROW, method=method, check=True)
+    assert np.abs(result["hinge.angle"] - true(1e7)).max() > 0.5
+    assert result.attributes["accuracy"].startswith("step: not known")
+    assert any("leaves out rebounds from stops" in note for note in result.attributes["notes"])
+    assert any("energy of 4.25 J has gone" in note for note in result.attributes["notes"])
+
+
+@pytest.mark.parametrize(
+    "scene",
+    [bouncing(1e3), bouncing(1e7, lower=-2.0), bouncing(1e5, damping=1e3)],
+    ids=["resolved", "not met", "damped"],
+)
+def test_what_is_resolved_or_takes_energy_is_not(scene):
+    result = forward(scene, end=END if scene.forces[0].lower == LOWEST else 0.4, output_step=ROW, method=ROS3(1e-3))
+    assert not any("rebounds" in note or "has gone" in note for note in result.attributes["notes"])
+    assert "rebounds" not in result.attributes
+
+
+def test_a_stop_stores_what_it_takes():
+    stop = bouncing(2e3).forces[0]
+    depths = np.linspace(-0.5 * ENTRY, 3 * ENTRY, 701)
+    forces = np.array([stop.law(None, LOWEST - depth, 0.0) for depth in depths])
+    work = np.concatenate([[0.0], np.cumsum(0.5 * np.diff(depths) * (forces[1:] + forces[:-1]))])
+    np.testing.assert_allclose(stop.energy(LOWEST - depths), work, atol=1e-5 * work[-1])
+
+
+SLOW = pytest.mark.slow
+
+
+@pytest.mark.parametrize(
+    ("stiffness", "row"), [pytest.param(1e6, 1e-3, marks=SLOW), pytest.param(1e7, 5e-3, marks=SLOW), (1e4, 1e-2)]
+)
+def test_an_economic_model_rebounds(stiffness, row):
+    scene = bouncing(stiffness)
+    found = economise(scene, [Output("hinge.angle", tolerance=0.05)], end=END, output_step=row, verify=False)
+    off = np.abs(run(found.scene, found.settings)["hinge.angle"] - true(stiffness, row)).max()
+    assert off <= 1.5 * found.error[0]
+    assert found.error[0] <= found.limits[0]
