@@ -9,6 +9,7 @@ parts as that takes; where no part is small enough the mechanism locks.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -20,11 +21,13 @@ from ffr_dyn.analyses.outcome import output_times, result_of, turned_along
 from ffr_dyn.analyses.registry import OverTime
 from ffr_dyn.analyses.settings import Settings
 from ffr_dyn.closing.limits import with_limits
+from ffr_dyn.compile.divided_steps import fast_of
 from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.consistency import doubts
 from ffr_dyn.consistency.assemble import Assembled, assemble
 from ffr_dyn.consistency.evaluation import Evaluation, Evaluator, copied, evaluate, evaluator, joined, total_mass_matrix
 from ffr_dyn.consistency.mobility import named_motion, require_driven
+from ffr_dyn.equations.constraint_rows import blocks_of, rows_at
 from ffr_dyn.equations.layout import moved, to_body_axes, to_global_axes
 from ffr_dyn.kernels.tables import EVALUATIONS, Record
 from ffr_dyn.results.quantities import selected
@@ -82,9 +85,10 @@ def kinematic(
 
     outputs : names or patterns of the quantities to keep beside the efforts, as in `forward`
 
-    Raises InputError when a rigid motion is left free or prescribed twice, ComputationError when the mechanism locks: the
-    message gives the time and the joint at its dead point. Positions that are nearly or exactly singular on the way, where
-    the motion could branch, are told in the notes; rows there are limits from both sides, and reactions that grow without
+    Raises InputError when a rigid motion is left free or prescribed twice, or what a driver asks for has no value or no
+    bound, ComputationError when the mechanism locks: the message gives the time and the joint at its dead point. Positions
+    that are nearly or exactly singular on the way, where the motion could branch, are told in the notes; rows there are
+    limits from both sides, and reactions that grow without
     bound are nan.
 
     >>> result = fd.kinematic(scene, end=0.2, output_step=1e-3)
@@ -126,6 +130,7 @@ def along_the_path(
     require_driven(rigid, start, "a kinematic analysis")
     assembled = assemble(rigid, time=start)
     selected(assembled.system, outputs)
+    _refuse_poles(assembled.system, start, end, output_step)
     at = evaluator(assembled.all_rows or assembled.system)
     pose = replace(
         _pose(at, start, assembled.x, assembled.v), v=to_body_axes(at.system.layout, assembled.x, assembled.v)
@@ -162,6 +167,7 @@ def _undeformed_notes(scene: Scene) -> list[str]:
 
 def _follow(at: Evaluator, pose: _Pose, end: float, output_step: float) -> list[_Pose]:
     """Poses from `pose` to the time `end`, in parts that are halved until Newton's method converges from the prediction."""
+    scene, layout = at.system.scene, at.system.layout
     found, part = [pose], end - pose.time
     while found[-1].time < end:
         part = min(part, end - found[-1].time)
@@ -169,6 +175,8 @@ def _follow(at: Evaluator, pose: _Pose, end: float, output_step: float) -> list[
         if after is None:
             part /= 2
             if part < SMALLEST_PART * output_step:
+                # InputError where it is no dead point: a driver has no value there.
+                rows_at(scene, layout, blocks_of(scene), found[-1].x, np.zeros(layout.v_size), end)
                 raise _locked(at, found[-1])
         else:
             found.append(after)
@@ -222,6 +230,12 @@ def _conditioning(at: Evaluator, now: Evaluation, x: Array) -> tuple[float, floa
     square = weighted.shape[0] == weighted.shape[1]
     sign = float(np.linalg.slogdet(weighted)[0]) if square else 0.0
     return float(values[place.v_size - 1]), sign, np.linalg.solve(lower.T, basis[place.v_size - 1])
+
+
+def _refuse_poles(system: System, start: float, end: float, output_step: float) -> None:
+    """Raises InputError where a function of time grows without bound."""
+    with suppress(ComputationError):  # it may change many times from row to row
+        fast_of(system, start, end, output_step, output_step)
 
 
 def _locked(at: Evaluator, pose: _Pose) -> ComputationError:

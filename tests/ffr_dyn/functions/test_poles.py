@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from ffr_dyn.analyses.forward import forward
+from ffr_dyn.analyses.kinematic import kinematic
 from ffr_dyn.functions.formula import formula
 from ffr_dyn.functions.poles import pole
 from ffr_dyn.functions.time_functions import evaluate
 from ffr_dyn.integrators import ROS2
+from ffr_dyn.scene.drivers import Driver
 from ffr_dyn.scene.forces import Load
 from ffr_dyn.scene.joints import Joint
 from ffr_dyn.scene.scene import Body, Scene
@@ -68,3 +72,22 @@ def test_a_run_over_a_pole_is_refused(text):
 def test_a_run_that_ends_before_a_pole_is_not():
     result = forward(pushed("1 / (0.2 - t)"), end=0.1, output_step=0.01, method=ROS2(1e-4), check=False)
     assert result["cart.a.velocity"][-1, 0] == pytest.approx(np.log(2.0), rel=1e-5)
+
+
+@pytest.mark.parametrize("at", [0.0505, 0.1])
+@pytest.mark.parametrize(("word", "coordinate"), [("translational", "stroke"), ("revolute", "angle")])
+def test_a_mechanism_that_is_driven_to_a_pole_is_refused_and_at_no_dead_point(word, coordinate, at):
+    """It was at 2e14 m, or was told to lock."""
+    joint = Joint("rail", word, "ground.O", "cart.a", axis=(1, 0, 0))
+    motor = Driver("motor", "rail", formula(f"0.1 / (t - {at})"), coordinate=coordinate)
+    scene = replace(pushed("0"), loads=(), joints=(joint,), drivers=(motor,))
+    with pytest.raises(InputError, match=f"'motor': the function of time grows without bound at t = {at} s"):
+        kinematic(scene, end=0.1, output_step=0.01)
+
+
+def test_a_driver_without_a_value_is_no_dead_point():
+    motor = Driver("motor", "rail", formula("0.1 * log(abs(t - 0.5))"))
+    hinge = Joint("rail", "revolute", "ground.O", "cart.a")
+    scene = replace(pushed("0"), loads=(), joints=(hinge,), drivers=(motor,))
+    with pytest.raises(InputError, match=r"driver 'motor': the function of time has no value at t = 0\.5 s"):
+        kinematic(scene, end=1.0, output_step=0.01)
