@@ -51,6 +51,7 @@ def test_bodies_scenes_and_results_are_tables(cells):
         assert len(kinds["text/plain"]) < 1200
 
 
+@pytest.mark.slow
 def test_scenes_and_films_are_viewers_and_plots_are_pictures(cells):
     for words in ("fd.show", "fd.animate"):
         kinds, _ = shown(cells, words)

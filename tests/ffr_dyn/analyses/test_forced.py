@@ -81,6 +81,7 @@ def test_duffings_oscillator_is_that_of_harmonic_balance(swept):
     np.testing.assert_allclose(f[turning], jumps, rtol=5e-3)
 
 
+@pytest.mark.slow
 def test_the_backbone_is_that_of_the_free_oscillator(swept):
     """Where the first harmonic lags by a quarter the amplitude is that of a free vibration, by an elliptic integral."""
     phase = swept["phase"][:, 0]

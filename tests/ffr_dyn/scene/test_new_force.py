@@ -136,6 +136,7 @@ def test_energy_is_kept_and_accounted_for(scene):
     np.testing.assert_allclose(result["block.R"][:, 1:], 0.0, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_equilibrium_and_small_vibration_have_their_closed_forms(scene):
     held = replace(scene, forces=(*scene.forces, JointSpring("hold", "guide", stiffness=5.0)))
     at = scene_at(held, static(held))

@@ -306,6 +306,7 @@ def test_a_body_comes_back(tmp_path, n, layout):
         assert back.provenance["layout"] == {"Gr": layout, "Ge": layout}
 
 
+@pytest.mark.slow
 def test_a_reduced_mesh_comes_back_and_is_written_the_same_again(tmp_path, beam):
     first = write_sid(beam, tmp_path / "1.SID_FEM", surface=True)
     back = read_sid(first)

@@ -33,6 +33,7 @@ def files(tmp_path_factory):
     }
 
 
+@pytest.mark.slow
 def test_a_plate_with_bores_has_the_mass_properties_of_its_formula(files):
     body = fp.rigid_part(files["plate"], RHO)
     a, b, t, r = 0.12, 0.08, 0.01, 0.006

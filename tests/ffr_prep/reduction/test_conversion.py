@@ -101,6 +101,7 @@ def test_other_reductions_convert_as_well(reduction):
     np.testing.assert_allclose(converted.frequencies[:6], direct.frequencies[:6], rtol=1e-8)
 
 
+@pytest.mark.slow
 def test_frames_of_beams_convert_with_their_section_forces():
     def made(reference):
         return fp.reduce(

@@ -49,6 +49,7 @@ def test_matrices_are_symmetric_and_one_for_each_load(rod):
     assert not rod.stiffening.flags.writeable
 
 
+@pytest.mark.slow
 def test_a_pinned_column_buckles_at_eulers_load(rod):
     """Compression at the roller, Omega^2 + P K_sigma singular at P = pi^2 E I / L^2."""
     push = -rod.stiffening[INERTIAL + 6]  # unit force along -x at the second interface
