@@ -30,7 +30,7 @@ from ffr_dyn.scene.scene import Scene, altered, require_scene
 from ffr_dyn.scene.sensors import Measurement
 from ffr_dyn.variants.mean_axis import in_mean_axis_frames
 from ffr_dyn.variants.plane import obstacles, planar_forms
-from ffr_prep.body import mesh_doubt, steady_stress_doubt, units_doubts
+from ffr_prep.body import mesh_doubt, shear_doubt, steady_stress_doubt, units_doubts
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.brief import Brief
 from ffr_prep.common.errors import InputError
@@ -118,7 +118,8 @@ def body_doubts(scene: Scene) -> list[str]:
     be meant."""
     measured = {of.body for of in scene.measurements if not isinstance(of, Measurement)}
     doubts = [(body.name, mesh_doubt(body.model.provenance)) for body in scene.bodies]
-    doubts += [(b.name, steady_stress_doubt(b.model.provenance)) for b in scene.bodies if b.name in measured]
+    stressed = [body for body in scene.bodies if body.name in measured]
+    doubts += [(b.name, of(b.model.provenance)) for b in stressed for of in (steady_stress_doubt, shear_doubt)]
     doubts += [(body.name, doubt) for body in scene.bodies for doubt in units_doubts(body.model)]
     return [f"body {name!r}: {doubt}" for name, doubt in doubts if doubt] + _gravity_doubts(scene)
 

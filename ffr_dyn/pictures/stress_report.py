@@ -53,6 +53,7 @@ class StressReport:
 
     errors : by body the largest von Mises stress [Pa] that its shapes leave out, where that is known, and the largest that
              they show
+    lacks  : by body what else its stress does not hold, in words
     """
 
     quantity: str
@@ -60,6 +61,7 @@ class StressReport:
     sections: dict[str, tuple[SectionPeak, ...]]
     files: tuple[Path, ...]
     errors: dict[str, tuple[float, float]] = field(default_factory=dict)
+    lacks: dict[str, str] = field(default_factory=dict)
 
     def _repr_html_(self) -> str:
         """The report in words, and its pictures, for a notebook."""
@@ -104,7 +106,14 @@ def stress_report(
     files += [file for name in beams for file in _section_files(result, name, points, folder)]
     files += [_peak_picture(result, name, spots, quantity, folder / f"{name}.png") for name in bodies]
     sections = {name: section_peaks(result, name) for name in beams}
-    return StressReport(quantity, spots, sections, tuple(files), dict(_errors(result, bodies)))
+    errors, lacks = dict(_errors(result, bodies)), {name: said for name in bodies if (said := _lacks(result, name))}
+    return StressReport(quantity, spots, sections, tuple(files), errors, lacks)
+
+
+def _lacks(result: Result, body: str) -> str:
+    names = result.attributes.get("parts", {}).get(body, [body])
+    known = result.attributes.get("stress_lacks", {})
+    return "; ".join(dict.fromkeys(known[name] for name in names if name in known))
 
 
 def _errors(result: Result, bodies: Sequence[str]) -> Iterator[tuple[str, tuple[float, float]]]:
@@ -129,6 +138,7 @@ def report_lines(report: StressReport) -> Iterator[str]:
         at = ", ".join(f"{x:9.5g}" for x in spot.position)
         yield f"{k + 1:7d}     {factor * spot.value:10.4g}  {spot.body:{width}}  ({at})  {spot.time:.6g}"
     yield from (_accuracy(body, *of) for body, of in report.errors.items())
+    yield from (f"accuracy    {body}: {said}" for body, said in report.lacks.items())
     for body, sections in report.sections.items():
         yield f"sections    largest section forces of {body}"
         for peak in sections:

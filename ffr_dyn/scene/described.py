@@ -16,7 +16,7 @@ from ffr_dyn.scene.forces.places import effort
 from ffr_dyn.scene.joints import Joint, frames
 from ffr_dyn.scene.parts import wholes
 from ffr_dyn.scene.scene import Scene
-from ffr_prep.body import left_out_stress
+from ffr_prep.body import left_out_stress, shear_doubt
 
 # Joints of these kinds have no axis to speak of.
 _WITHOUT_AXIS = ("spherical", "fixed", "distance", "orientation")
@@ -26,14 +26,16 @@ def described(scene: Scene) -> dict[str, Any]:
     """Plain JSON values: the title; the `mass` [kg] of all bodies and a `length` [m], the largest radius of gyration about
     the origin of a body's frame, which tell what is small; the parts of bodies by the name of the whole; places (3,) of the
     ground's points [m]; by the name of a joint, driver, coupling or force the markers `at` which it is, and what of it is
-    drawn; and of bodies with stress, where the base rests, `gravity` and what their shapes leave out
-    (`ffr_prep.body.left_out_stress`).
+    drawn; and of bodies with stress what it lacks, in words, and, where the base rests, `gravity` and what their shapes
+    leave out (`ffr_prep.body.left_out_stress`).
     """
     parts = {name: [part.name for part in of] for name, of in wholes(scene.bodies).items()}
     ground = {name: at.tolist() for name, at in scene.ground.items()}
     sizes = {"mass": sum(body.model.mass for body in scene.bodies), "length": _length(scene)}
     stress = {body.name: of for body in scene.bodies if (of := left_out_stress(body.model.provenance))}
+    lacks = {body.name: said for body in scene.bodies if (said := shear_doubt(body.model.provenance))}
     found: dict[str, Any] = {**sizes, "parts": parts, "ground": ground, "connections": _connections(scene)}
+    found |= {"stress_lacks": lacks}
     if stress and all(is_zero(f) for f in scene.base_acceleration):  # which a result does not keep
         found |= {"gravity": [float(g) for g in scene.gravity], "left_out_stress": stress}
     return {"title": scene.name} | {key: value for key, value in found.items() if value}

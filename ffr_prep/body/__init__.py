@@ -46,9 +46,11 @@ from ffr_prep.body.second_order import (
 )
 from ffr_prep.body.steady_stress import (
     STEADY_STRESS,
+    WITHOUT_SHEAR,
     largest_von_mises,
     left_out_stress,
     of_fewer_shapes,
+    shear_doubt,
     steady_stress_doubt,
 )
 from ffr_prep.body.units_doubt import units_doubts
@@ -59,6 +61,7 @@ __all__ = [
     "SECTION_FORCES",
     "STEADY_STRESS",
     "TENSOR",
+    "WITHOUT_SHEAR",
     "BeamForces",
     "BodyError",
     "Damping",
@@ -98,6 +101,7 @@ __all__ = [
     "rigid_body",
     "save_arrays",
     "save_body",
+    "shear_doubt",
     "some_points",
     "steady_stress_doubt",
     "surface_arrays",

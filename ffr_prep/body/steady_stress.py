@@ -12,7 +12,7 @@ from ffr_prep.body.frame_change import interface_motions, loads_on_motions
 from ffr_prep.body.reduced import FlexibleBody
 from ffr_prep.common.arrays import Array
 
-STEADY_STRESS = "steady_stress"  # of the provenance
+STEADY_STRESS, WITHOUT_SHEAR = "steady_stress", "sections_without_shear"  # of the provenance
 TOLD = 0.1  # of the largest stress under a load, from where on it is told unasked
 _MEAN = 1e-9  # of the root of the mass: what moves the centre of mass in a frame of the mean motion
 _LOADS = (
@@ -40,6 +40,19 @@ def steady_stress_doubt(provenance: Mapping[str, Any]) -> str | None:
         f"its shapes leave out stress of its own inertia: up to {100 * shares[worst]:.0f} % of the largest, under "
         f"{_LOADS[worst]}; add the shapes of such loads (`--method craig-bampton --method inertia-relief`; "
         "InertiaRelief() in a Union)"
+    )
+
+
+def shear_doubt(provenance: Mapping[str, Any]) -> str | None:
+    """The warning about a body with stress in which beams have sections that do not know their shear; None of others."""
+    sections = provenance.get(WITHOUT_SHEAR, [])
+    if not sections:
+        return None
+    named = ", ".join(repr(name) for name in sections)
+    return (
+        f"section{'s' * (len(sections) > 1)} {named}: given by constants, the stress is that of a rectangle of the same "
+        "second moments, and holds no shear of transverse forces, nor of torque unless J = Iy + Iz; a shape (rectangle, "
+        "circle, tube, i) holds both"
     )
 
 

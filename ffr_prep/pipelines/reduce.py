@@ -10,7 +10,17 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from ffr_prep.body import Damping, FlexibleBody, Interface, mesh_doubt, steady_stress_doubt, units_doubts, with_damping
+from ffr_prep.body import (
+    WITHOUT_SHEAR,
+    Damping,
+    FlexibleBody,
+    Interface,
+    mesh_doubt,
+    shear_doubt,
+    steady_stress_doubt,
+    units_doubts,
+    with_damping,
+)
 from ffr_prep.body.provenance import described
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError, InputError
@@ -173,7 +183,8 @@ def _reduced(model: Model, request: Request, progress: Stages, advance: Advance)
             progress("compute the second order of the surface")
             drawn = replace(basis, Z=basis.Z[:, : request.drawn_modes], omega2=basis.omega2[: request.drawn_modes])
             surface = with_second_order(surface, model, held, request.reference, drawn, advance)
-    doubts = [*model.doubts(basis.Z), *filter(None, [mesh_doubt(of_mesh), steady_stress_doubt(of_stress)])]
+    found = [mesh_doubt(of_mesh), steady_stress_doubt(of_stress), shear_doubt(model.record) if request.stress else None]
+    doubts = [*model.doubts(basis.Z), *filter(None, found)]
     made = FlexibleBody(
         name=request.name,
         omega2=basis.omega2,
@@ -267,5 +278,7 @@ def record(model: Model, request: Request, doubts: Sequence[str]) -> dict[str, A
         "warnings": [*model.record.get("warnings", []), *doubts],
         "solver": {key: value for key, value in described(request.solver).items() if key != "verify"},
     }
+    if not (request.stress and of_model.get(WITHOUT_SHEAR)):
+        of_model.pop(WITHOUT_SHEAR, None)
     recovered = {"stress": model.recovery} if request.stress else {}
     return of_model | recovered | dict(request.provenance)

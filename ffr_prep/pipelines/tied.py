@@ -20,7 +20,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
-from ffr_prep.body import Surface
+from ffr_prep.body import WITHOUT_SHEAR, Surface
 from ffr_prep.body.accelerations import INERTIAL
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
@@ -93,8 +93,12 @@ def tied(parts: Mapping[str, Model], ties: Sequence[tuple[str, str]]) -> Model:
         second=second,
         recovery="; ".join(dict.fromkeys(m.recovery for m in models)),
         record={
-            "parts": {name: {k: v for k, v in part.record.items() if k != "warnings"} for name, part in parts.items()},
+            "parts": {
+                name: {k: v for k, v in part.record.items() if k not in ("warnings", WITHOUT_SHEAR)}
+                for name, part in parts.items()
+            },
             "ties": [list(pair) for pair in ties],
+            WITHOUT_SHEAR: [name for part in parts.values() for name in part.record.get(WITHOUT_SHEAR, [])],
             "warnings": [f"{name}: {w}" for name, part in parts.items() for w in part.record.get("warnings", [])],
         },
         doubts=lambda basis: _doubts(parts, [x @ basis for x in own]),

@@ -9,18 +9,17 @@ an element are off by p l^2 / 24 only, and tension and shear there are exact to 
 
 Stress on the outline of a section, at (y, z) from its centroid:
 
-    sigma_xx = N / A + My z / Iy - Mz y / Iz,    tau_xy = -Mx z / J,    tau_xz = Mx y / J,
+    sigma_xx = N / A + My z / Iy - Mz y / Iz,    (tau_xy, tau_xz) = shear . (Qy, Qz, Mx),
 
-the shear of the torque in round sections alone, where it holds (J = Iy + Iz). The corners of rectangles carry none of it.
-The shear of transverse forces, which vanishes at the fibres that bending stresses most, is left out. A section given by
-its constants has the outline of the rectangle with the same second moments.
+with the shear stress that the shape of the section knows at its outline (`ffr_prep.structures.sections`). A section given by
+its constants has the outline of the rectangle with the same second moments, and no shear but that of the torque where it is
+round, J = Iy + Iz: tau_xy = -Mx z / J, tau_xz = Mx y / J.
 
 Source: S. P. Timoshenko, J. N. Goodier, Theory of Elasticity, 3rd ed. (1970), articles 102 and 109.
 """
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 
 import numpy as np
@@ -29,9 +28,10 @@ from ffr_prep.body import TENSOR, BeamForces, Surface
 from ffr_prep.common.arrays import Array
 from ffr_prep.structures.beam_surface import Moved, prisms, stations, swept_surface
 from ffr_prep.structures.beams import Beams, element_coordinates, stiffness, undeformed
-from ffr_prep.structures.frame import Frame, Member
+from ffr_prep.structures.frame import Frame
+from ffr_prep.structures.sections import Section
 
-SECTION_STRESS = "section forces K e of the elements; normal stress of tension and bending, shear of torque if round"
+SECTION_STRESS = "section forces K e of the elements; tension, bending, shear of transverse forces and torque"
 _ROWS, _COLUMNS = np.array(TENSOR).T
 _MIDDLE = np.array([0.0, 0.5, 1.0])
 
@@ -39,11 +39,13 @@ _MIDDLE = np.array([0.0, 0.5, 1.0])
 def stressed_sweep(frame: Frame, elements: Beams, moved: Moved, modes: Array) -> Surface:
     """The swept surface of the frame with the stress at its points of the section forces modes (E, 3, 6, n)."""
     stress, moduli = [], []
-    for own, outline in prisms(frame):
+    for own, outline, shear in prisms(frame):
         member = frame.members[frame.member_of[own[0]]]
         xi, across = stations(outline, len(own))
         at_stations = section_forces_at(modes[own], xi)
-        stress.append(_outline_stress(member, elements.C[own], across, at_stations).reshape(-1, 6, modes.shape[3]))
+        tau = np.tile(shear, (len(xi) // len(shear), 1, 1))
+        of_own = _outline_stress(member.section, elements.C[own], across, tau, at_stations)
+        stress.append(of_own.reshape(-1, 6, modes.shape[3]))
         moduli.append(np.tile([member.material.E, member.material.nu], (len(stress[-1]), 1)))
     return replace(
         swept_surface(frame, elements, moved),
@@ -90,15 +92,16 @@ def section_forces_at(modes: Array, xi: Array) -> Array:
     return (1 - xi) * first + xi * last
 
 
-def _outline_stress(member: Member, C: Array, across: Array, forces: Array) -> Array:
-    """(E, Q, 6, n) stress in body axes at (y, z) = across (E, Q, 2) of sections with the forces (E, Q, 6, n)."""
-    section = member.section
-    N, _, _, Mx, My, Mz = np.moveaxis(forces, 2, 0)
+def _outline_stress(section: Section, C: Array, across: Array, shear: Array, forces: Array) -> Array:
+    """(E, Q, 6, n) stress in body axes at (y, z) = across (E, Q, 2) of sections with the forces (E, Q, 6, n).
+
+    shear : (Q, 3, 2) tau_xy and tau_xz of unit Qy, Qz and Mx
+    """
+    N, _, _, _, My, Mz = np.moveaxis(forces, 2, 0)
     y, z = across[..., 0, None], across[..., 1, None]
     in_element_axes = np.zeros((*N.shape[:2], 3, 3, N.shape[2]))
     in_element_axes[:, :, 0, 0] = N / section.A + My * z / section.Iy - Mz * y / section.Iz
-    if math.isclose(section.J, section.Iy + section.Iz, rel_tol=1e-9):
-        in_element_axes[:, :, 0, 1] = in_element_axes[:, :, 1, 0] = -Mx * z / section.J
-        in_element_axes[:, :, 0, 2] = in_element_axes[:, :, 2, 0] = Mx * y / section.J
+    tau = np.einsum("qfs,eqfj->eqsj", shear, forces[:, :, 1:4])
+    in_element_axes[:, :, 0, 1:] = in_element_axes[:, :, 1:, 0] = tau
     tensor = np.einsum("eik,eqklj,eml->eqimj", C, in_element_axes, C, optimize=True)
     return tensor[:, :, _ROWS, _COLUMNS]

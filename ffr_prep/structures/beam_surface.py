@@ -10,6 +10,7 @@ from ffr_prep.body import Surface
 from ffr_prep.common.arrays import Array
 from ffr_prep.structures.beams import Beams, field, picked, undeformed
 from ffr_prep.structures.frame import Frame
+from ffr_prep.structures.sections import outline_shear
 
 _STATIONS = 5
 
@@ -22,7 +23,7 @@ def swept_surface(frame: Frame, elements: Beams, moved: Moved) -> Surface:
     moved : of some elements, xi (Q,) and across (E, Q, 2), the fields (E, Q, 3, n) there, in body axes
     """
     points, triangles, shapes, count = [], [], [], 0
-    for own, outline in prisms(frame):
+    for own, outline, _ in prisms(frame):
         xi, across = stations(outline, len(own))
         first = count + len(xi) * np.arange(len(own))
         points.append(undeformed(picked(elements, own), xi, across).reshape(-1, 3))
@@ -38,13 +39,13 @@ def moved_linearly(elements: Beams, nodal: Array) -> Moved:
     return lambda own, xi, across: field(picked(elements, own), xi, across) @ nodal[own][:, None]
 
 
-def prisms(frame: Frame) -> list[tuple[Array, Array]]:
-    """The elements of each member with each polygon (P, 2) of its section."""
+def prisms(frame: Frame) -> list[tuple[Array, Array, Array]]:
+    """The elements of each member with each polygon (P, 2) of its section and the shear (P, 3, 2) at its corners."""
     of_members = [np.flatnonzero(frame.member_of == k) for k in range(len(frame.members))]
     return [
-        (own, np.array(polygon))
+        (own, np.array(polygon), np.array(shear))
         for own, member in zip(of_members, frame.members, strict=True)
-        for polygon in member.section.outline
+        for polygon, shear in zip(member.section.outline, outline_shear(member.section), strict=True)
         if own.size
     ]
 

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from ffr_prep.body import Surface
+from ffr_prep.body import WITHOUT_SHEAR, Surface
 from ffr_prep.body.accelerations import INERTIAL, unit_accelerations
 from ffr_prep.body.provenance import described
 from ffr_prep.common.arrays import Array
@@ -182,6 +182,7 @@ def _record(
         "members": [_strict(described(member)) for member in frame.members],
         "shells": [described(shell) for shell in frame.shells],
         "interfaces": [described(interface) for interface in interfaces],
+        WITHOUT_SHEAR: list(dict.fromkeys(m.section.name for m in frame.members if not m.section.shear)),
         "warnings": [
             *overlap_doubts(frame),
             *dict.fromkeys(said for one in materials for said in material_doubts(one)),

@@ -4,9 +4,13 @@ A section lies in the y'z' plane of its element, x' runs along the beam. Its axe
 centroid: the integral of y z over the section vanishes, and the shear centre is taken to be the centroid. The height h
 of a shape is measured along y', its width b along z', so  Iz = integral of y^2 dA  belongs to bending in the x'y' plane.
 
+Shapes know the shear stress at their outline: of torque by Saint-Venant, of transverse forces by the elementary theory,
+Q S / (I b), tangential to the outline.
+
 Sources: S. P. Timoshenko, J. N. Goodier, Theory of Elasticity, 3rd ed. (1970), art. 109 (torsion of a rectangle) and
-112 (thin open sections); G. R. Cowper, J. Appl. Mech. 33 (1966) 335-340 (shear factors, here for nu = 0);
-W. C. Young, R. G. Budynas, Roark's Formulas for Stress and Strain, 7th ed. (2002), section 8.10 (shear of I-beams).
+112 (thin open sections); S. P. Timoshenko, Strength of Materials I, 3rd ed. (1955), ch. IV (shear of transverse forces);
+G. R. Cowper, J. Appl. Mech. 33 (1966) 335-340 (shear factors, here for nu = 0); W. C. Young, R. G. Budynas,
+Roark's Formulas for Stress and Strain, 7th ed. (2002), section 8.10 (shear of I-beams).
 """
 
 from __future__ import annotations
@@ -16,10 +20,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 
 Point = tuple[float, float]
 Polygon = tuple[Point, ...]
+Shears = tuple[tuple[Point, Point, Point], ...]
 
 _AROUND = 16
 _SERIES = np.arange(1, 200, 2)
@@ -38,6 +44,8 @@ class Section:
                   the whole section: rotary, polar and, of the undeformed body, its extent across the axis
     outline     : convex polygons (y, z) that are drawn [m], counter-clockwise from y' to z'; a rectangle of the same
                   second moments when not given
+    shear       : for each polygon and corner (tau_xy, tau_xz) of unit Qy, of unit Qz [1/m^2] and of unit Mx [1/m^3]; empty
+                  where it is not known
 
     Raises InputError for constants that no section has.
 
@@ -54,6 +62,7 @@ class Section:
     offset: Point = (0.0, 0.0)
     mass_moments: Point | None = None
     outline: tuple[Polygon, ...] = ()
+    shear: tuple[Shears, ...] = ()
 
     def __post_init__(self) -> None:
         _check_constants(self)
@@ -86,8 +95,10 @@ def rectangle(b: float, h: float) -> Section:
     _check_lengths(name, b=b, h=h)
     short, long = sorted((b, h))
     terms = np.tanh(_SERIES * np.pi * long / (2 * short)) / _SERIES**5.0
-    J = long * short**3 / 3 * (1 - 192 / np.pi**5 * short / long * terms.sum())
-    return Section(name, b * h, h * b**3 / 12, b * h**3 / 12, float(J), 5 / 6, 5 / 6, outline=(_corners(h, b),))
+    J = float(long * short**3 / 3 * (1 - 192 / np.pi**5 * short / long * terms.sum()))
+    most = 1.5 / (b * h)
+    shear = _shears(across=most, along=most, twisted=_twisted(h, b) / J)
+    return Section(name, b * h, h * b**3 / 12, b * h**3 / 12, J, 5 / 6, 5 / 6, outline=(_sides(h, b),), shear=(shear,))
 
 
 def circle(d: float) -> Section:
@@ -100,7 +111,9 @@ def circle(d: float) -> Section:
     name = f"circle {d:g} m"
     _check_lengths(name, d=d)
     second = math.pi * d**4 / 64
-    return Section(name, math.pi * d**2 / 4, second, second, 2 * second, 6 / 7, 6 / 7, outline=(_ring(d / 2),))
+    A = math.pi * d**2 / 4
+    ring, shear = _ring(d / 2), _ring_shears(d / 2, 4 / (3 * A), 2 * second)
+    return Section(name, A, second, second, 2 * second, 6 / 7, 6 / 7, outline=(ring,), shear=(shear,))
 
 
 def tube(d: float, t: float) -> Section:
@@ -118,13 +131,17 @@ def tube(d: float, t: float) -> Section:
     second = math.pi * (d**4 - bore**4) / 64
     ratio = (bore / d) ** 2
     k = 6 * (1 + ratio) ** 2 / (7 * (1 + ratio) ** 2 + 20 * ratio)
-    return Section(name, math.pi * (d**2 - bore**2) / 4, second, second, 2 * second, k, k, outline=(_ring(d / 2),))
+    A = math.pi * (d**2 - bore**2) / 4
+    most = 4 / (3 * A) * (d**2 + d * bore + bore**2) / (d**2 + bore**2)
+    ring, shear = _ring(d / 2), _ring_shears(d / 2, most, 2 * second)
+    return Section(name, A, second, second, 2 * second, k, k, outline=(ring,), shear=(shear,))
 
 
 def i_section(h: float, b: float, web: float, flange: float) -> Section:
     """Doubly symmetric I of height h (along y'), width b (along z'), web and flange thickness [m], sharp corners.
 
-    Torsion as thin strips, the sum of s t^3 / 3; shear along y' is carried by the web, along z' by the flanges.
+    Torsion as thin strips, the sum of s t^3 / 3; shear along y' is carried by the web, along z' by the flanges. The shear
+    stress that transverse forces cause along the flanges on their way to the web is left out.
 
     Raises InputError unless 2 flange < h and web < b.
 
@@ -139,9 +156,23 @@ def i_section(h: float, b: float, web: float, flange: float) -> Section:
     Iz = (b * h**3 - (b - web) * inner**3) / 12
     Iy = (2 * flange * b**3 + inner * web**3) / 12
     J = (2 * b * flange**3 + (h - flange) * web**3) / 3
-    flanges = tuple(_corners(flange, b, side * (h - flange) / 2) for side in (-1, 1))
-    outline = (*flanges, _corners(inner, web))
-    return Section(name, A, Iy, Iz, J, inner * web / A, 5 / 6 * 2 * b * flange / A, outline=outline)
+    flanges = tuple(_sides(flange, b, side * (h - flange) / 2) for side in (-1, 1))
+    of_flange = _shears(across=0.0, along=1.5 / (2 * b * flange), twisted=_twisted(flange, b) / J)
+    at_flange = b * flange * (h - flange) / 2 / (Iz * web)
+    of_web = _shears(
+        across=at_flange + inner**2 / (8 * Iz), along=0.0, twisted=_twisted(inner, web) / J, ends=at_flange
+    )
+    return Section(
+        name,
+        A,
+        Iy,
+        Iz,
+        J,
+        inner * web / A,
+        5 / 6 * 2 * b * flange / A,
+        outline=(*flanges, _sides(inner, web)),
+        shear=(of_flange, of_flange, of_web),
+    )
 
 
 def general(
@@ -187,12 +218,72 @@ def with_mass_moments(section: Section, Iy: float, Iz: float) -> Section:
     return replace(section, mass_moments=(float(Iy), float(Iz)))
 
 
+# ---- shear stress at the outline ----------------------------------------------------------------------------------
+
+
+def outline_shear(section: Section) -> tuple[Shears, ...]:
+    """For each polygon and corner (tau_xy, tau_xz) of unit Qy, of unit Qz [1/m^2] and of unit Mx [1/m^3].
+
+    A section that does not know it has none but that of the torque where it is round, J = Iy + Iz.
+    """
+    if section.shear:
+        return section.shear
+    turns = 1 / section.J if math.isclose(section.J, section.Iy + section.Iz, rel_tol=1e-9) else 0.0
+    return tuple(
+        tuple(((0.0, 0.0), (0.0, 0.0), (-z * turns, y * turns)) for y, z in polygon) for polygon in section.outline
+    )
+
+
+def _shears(*, across: float, along: float, twisted: Array, ends: float = 0.0) -> Shears:
+    """The shear stress at the points of `_sides`.
+
+    across  : tau_xy of unit Qy in the middle of the height [1/m^2];  ends : the same at its ends
+    along   : tau_xz of unit Qz in the middle of the width [1/m^2], none at its ends
+    twisted : of unit torque in the middle of the sides along y' and of those along z' [1/m^3]; corners carry none
+    """
+    along_y, along_z = (float(tau) for tau in twisted)
+    return tuple(
+        (
+            (ends if y else across, 0.0),
+            (0.0, 0.0 if z else along),
+            (0.0 if y else -z * along_y, 0.0 if z else y * along_z),
+        )
+        for y, z in _sides(2.0, 2.0)
+    )
+
+
+def _twisted(h: float, b: float) -> Array:
+    """(2,) shear stress in the middle of a rectangle's sides along y' (h) and along z' (b), of unit G theta [m]."""
+    short, long = sorted((h, b))
+    waves = _SERIES * np.pi * long / (2 * short)
+    signs = np.where(_SERIES % 4 == 1, 1.0, -1.0)
+    of_long = short * (1 - 8 / np.pi**2 * (1 / (_SERIES**2 * np.cosh(np.minimum(waves, 300.0)))).sum())
+    of_short = 8 * short / np.pi**2 * (signs * np.tanh(waves) / _SERIES**2).sum()
+    return np.array([of_long, of_short] if h >= b else [of_short, of_long])
+
+
+def _ring_shears(radius: float, most: float, J: float) -> Shears:
+    """At the points of `_ring`; most : shear stress of a unit force at the ends of the diameter across it [1/m^2]."""
+    return tuple(
+        ((most * s * s, -most * s * c), (-most * s * c, most * c * c), (-radius * s / J, radius * c / J))
+        for c, s in _ring(1.0)
+    )
+
+
 # ---- outlines and guards ------------------------------------------------------------------------------------------
 
 
 def _corners(h: float, b: float, y: float = 0.0) -> Polygon:
     """The rectangle of height h and width b about (y, 0)."""
     return ((y - h / 2, -b / 2), (y + h / 2, -b / 2), (y + h / 2, b / 2), (y - h / 2, b / 2))
+
+
+def _sides(h: float, b: float, y: float = 0.0) -> Polygon:
+    """The same with the middle of each side, from where on a fan of triangles has none without area."""
+    corners = np.array(_corners(h, b, y))
+    middles = (corners + np.roll(corners, -1, axis=0)) / 2
+    points = np.stack([middles, np.roll(corners, -1, axis=0)], axis=1).reshape(-1, 2)
+    return tuple((float(p[0]), float(p[1])) for p in points)
 
 
 def _ring(radius: float) -> Polygon:

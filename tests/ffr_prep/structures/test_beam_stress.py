@@ -13,7 +13,16 @@ from ffr_prep.model.reference import FixedTo
 from ffr_prep.reduction.methods.craig_bampton import CraigBampton
 from ffr_prep.reduction.methods.eigenmodes import Eigenmodes
 from ffr_prep.structures.beam_stress import section_forces_at
-from ffr_prep.structures.sections import circle, i_section, rectangle, shear_rigid, shifted, tube, with_mass_moments
+from ffr_prep.structures.sections import (
+    circle,
+    general,
+    i_section,
+    rectangle,
+    shear_rigid,
+    shifted,
+    tube,
+    with_mass_moments,
+)
 
 LENGTH = 1.2
 LOAD = np.array([2e4, 300.0, -500.0, 60.0, -70.0, 90.0])
@@ -105,18 +114,27 @@ def test_stress_of_a_round_bar():
     for (x, y, z), found in zip(body.surface.points, stress, strict=True):
         _, My, Mz = moment_at(x, LOAD)
         sigma = LOAD[0] / area + My * z / second - Mz * y / second
-        expected = [sigma, 0, 0, -LOAD[3] * z / (2 * second), LOAD[3] * y / (2 * second), 0]
+        along = 4 / (3 * area) * (LOAD[2] * y - LOAD[1] * z) / (d / 2) + LOAD[3] * d / (4 * second)  # round the outline
+        expected = [sigma, 0, 0, -along * z / (d / 2), along * y / (d / 2), 0]
         np.testing.assert_allclose(found, expected, rtol=1e-7, atol=1e-7 * np.abs(stress).max())
     np.testing.assert_array_equal(body.surface.moduli, np.tile([STEEL.E, STEEL.nu], (len(stress), 1)))
 
 
-def test_torque_stresses_no_corner_of_a_rectangle_and_the_offset_bends():
+def test_shear_of_a_rectangle_and_the_tension_of_its_offset():
+    """Torque: 0.267 and 0.263 b h^2 of sides of 3 to 1, 0.753 of it at the short ones: Timoshenko & Goodier, art. 109."""
     section = shifted(rectangle(0.02, 0.06), 0.05, 0.0)
     body = reduced(straight(section, LENGTH, 1))
-    torque = body.surface.stress @ static(body, "tip", np.array([0, 0, 0, 50.0, 0, 0]))
-    assert np.abs(torque).max() < 1e-7 * 50.0 / (0.02 * 0.02 * 0.06)
+    y, z = body.surface.points[:, 1] - 0.05, body.surface.points[:, 2]
+    shear = (body.surface.stress @ static(body, "tip", np.array([0, 0, 0, 50.0, 0, 0])))[:, 3:5]
+    most = 50.0 / (0.267 * 0.02**2 * 0.06)
+    long, short = np.abs(y) < 1e-9, np.abs(z) < 1e-9
+    np.testing.assert_allclose(shear[long], np.outer(-np.sign(z[long]) * most, [1.0, 0.0]), atol=2e-3 * most)
+    np.testing.assert_allclose(shear[short], np.outer(np.sign(y[short]) * 0.753 * most, [0.0, 1.0]), atol=2e-3 * most)
+    np.testing.assert_allclose(shear[~(long | short)], 0.0, atol=1e-6 * most)
+    shear = (body.surface.stress @ static(body, "tip", np.array([0, 300.0, -500.0, -500.0 * 0.05, 0, 0])))[:, 3:5]
+    np.testing.assert_allclose(shear[long], np.tile([1.5 * 300 / section.A, 0], (long.sum(), 1)), atol=1.0)
+    np.testing.assert_allclose(shear[short], np.tile([0, -1.5 * 500 / section.A], (short.sum(), 1)), atol=1.0)
     tension = body.surface.stress @ static(body, "tip", np.array([1e4, 0, 0, 0, 0, 0]))
-    y = body.surface.points[:, 1] - 0.05
     Mz = 1e4 * 0.05  # the force on the line of the nodes, about the centroid: -F * -offset
     np.testing.assert_allclose(tension[:, 0], 1e4 / section.A - Mz * y / section.Iz, rtol=1e-6)
 
@@ -126,6 +144,53 @@ def test_a_tube_under_torque_has_the_shear_of_its_outer_radius():
     stress = body.surface.stress @ static(body, "tip", np.array([0, 0, 0, 100.0, 0, 0]))
     J = np.pi * (0.06**4 - 0.052**4) / 32
     np.testing.assert_allclose(np.hypot(stress[:, 3], stress[:, 4]), 100.0 * 0.03 / J, rtol=1e-7)
+
+
+def test_an_i_section_has_the_shear_of_its_strips():
+    """Torque: M t / J in the middle of a strip; Qy: Q S / (I t) in the web, Qz: half of it in each flange, 3/2 at most."""
+    h, b, web, flange = 0.1, 0.06, 0.005, 0.008
+    section = i_section(h, b, web, flange)
+    body = reduced(straight(section, LENGTH, 1))
+    y, z = body.surface.points[:, 1:].T
+
+    def von_mises(load, where):
+        stress = body.surface.stress @ static(body, "tip", load)
+        return np.sqrt(3 * (stress[where, 3] ** 2 + stress[where, 4] ** 2))
+
+    in_web = (np.abs(y) < 1e-9) & np.isclose(np.abs(z), web / 2)
+    on_flange = np.isclose(np.abs(y), h / 2) & (np.abs(z) < 1e-9)
+    assert in_web.sum() == on_flange.sum() == 10
+    torque = np.array([0, 0, 0, 20.0, 0, 0])
+    np.testing.assert_allclose(von_mises(torque, in_web), np.sqrt(3) * 20.0 * web / section.J, rtol=1e-6)
+    np.testing.assert_allclose(von_mises(torque, on_flange), np.sqrt(3) * 20.0 * flange / section.J, rtol=1e-3)
+    inner = h - 2 * flange
+    S = b * flange * (h - flange) / 2 + web * inner**2 / 8
+    along_y = np.sqrt(3) * 300.0 * S / (section.Iz * web)
+    np.testing.assert_allclose(von_mises(np.array([0, 300.0, 0, 0, 0, 0]), in_web), along_y, rtol=1e-6)
+    along_z = np.sqrt(3) * 1.5 * 300.0 / (2 * b * flange)
+    np.testing.assert_allclose(von_mises(np.array([0, 0, 300.0, 0, 0, 0]), on_flange), along_z, rtol=1e-6)
+
+
+def test_shear_in_a_thick_tube_balances_its_force():
+    """What the web of a cut at the diameter carries, in the mean over its two walls, is Q S / (I b)."""
+    R, r = 0.03, 0.02
+    section = tube(2 * R, R - r)
+    [shear], [ring] = section.shear, section.outline
+    at_side = shear[int(np.argmax([z for _, z in ring]))]
+    S = 2 / 3 * (R**3 - r**3)
+    assert at_side[0] == pytest.approx((S / (section.Iz * 2 * (R - r)), 0.0), abs=1e-9)
+
+
+def test_a_section_by_its_constants_tells_that_its_shear_is_not_known():
+    rail = general("rail", A=1e-3, Iy=1e-7, Iz=2e-7, J=5e-8)
+    body = reduced(straight(rail, LENGTH, 1))
+    assert any("section 'rail'" in w and "shear" in w for w in body.provenance["warnings"])
+    assert not any("shear" in w for w in reduced(straight(circle(0.05), LENGTH, 1)).provenance["warnings"])
+    unstressed = fp.reduce(
+        fp.from_frame(straight(rail, LENGTH, 1), regions("root", "tip")),
+        fp.Request(name="frame", reference=FixedTo("root"), reduction=CraigBampton(0)),
+    )
+    assert not any("shear" in w for w in unstressed.provenance["warnings"])
 
 
 def test_a_load_along_the_beam_acts_through_the_nodes_as_stated():
