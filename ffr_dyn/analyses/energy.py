@@ -18,7 +18,7 @@ import numpy as np
 from ffr_dyn.compile.engine import fill_rows, new_engine
 from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.compile.workspace import new_record
-from ffr_dyn.consistency.balance import Account, add_rows, amiss, unresolved_rebounds
+from ffr_dyn.consistency.balance import Account, add_rows, amiss, lost_rebounds
 from ffr_dyn.consistency.evaluation import evaluator, joined, record_states
 from ffr_dyn.consistency.explicit_forces import candidates, fastest, told
 from ffr_dyn.consistency.tangent import chart, state_matrix
@@ -92,9 +92,9 @@ class EnergyWatch:
         found = amiss(self.account, kind + remedy[0], remedy[1])
         return [] if found and self._explained_between_rows() else found
 
-    def loses_rebounds(self) -> bool:
-        """Whether the steps are too long for the stops that are met."""
-        return unresolved_rebounds(self.account)
+    def lost_rebounds(self) -> list[str]:
+        """What tells that the steps are too long for the stops that are met."""
+        return lost_rebounds(self.account, 0.0 if self.method.controlled else self.method.step)
 
     def look(self, view: View) -> None:
         """Take note of the rows that follow. Raises ComputationError when their energy comes from nowhere."""

@@ -548,7 +548,7 @@ def _account(run: _Run, notes: list[str]) -> dict[str, Any]:
         "projections": int(info[PROJECTIONS]),
         **_steps(run.engine),
         "largest_drift": [float(drift[PHI]), float(drift[PHI_DOT])],
-        **({"rebounds": "not resolved"} if run.energy.loses_rebounds() else {}),
+        **({"rebounds": "; ".join(lost)} if (lost := run.energy.lost_rebounds()) else {}),
         "notes": [
             *notes,
             *ended(

@@ -13,7 +13,11 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ffr_dyn.compile.scene_tables import System
+from ffr_dyn.consistency.evaluation import evaluate, evaluator, free_motions, total_mass_matrix
+from ffr_dyn.equations.forces import At
 from ffr_dyn.equations.inertia import damping_matrix
+from ffr_dyn.equations.jets import coordinates
+from ffr_dyn.equations.placed import all_placed, nothing_on, pair
 from ffr_dyn.kernels.tables import SINCE, Record
 from ffr_dyn.results.power import measured_values
 from ffr_dyn.results.recorded_motion import View
@@ -29,6 +33,17 @@ QUIET = 1e-6  # m^2/s^2, twice the energy by mass that is not looked at
 # Numbers of an account [s], [J], [W]: see `Account`.
 TIME, BEGUN, WORK, OPEN, MOST, WORST, WHEN, POWER, BEFORE, TOTAL, AT_STOPS, BESIDE = range(12)
 REACHED = 2.0  # times the steps from row to row: where a stop is as near, it may be met between them
+RESOLVED = 4.0  # steps in the time that a stop is met for, with fewer it gives back something else
+REBOUND = AMISS**2  # of the largest energy, which comes back from a stop: from where on its loss is told
+
+
+@dataclass(frozen=True)
+class Met:
+    """The fastest approach to a stop: the row, as a record, with the joint coordinate and its rate."""
+
+    row: Record
+    c: float
+    rate: float
 
 
 @dataclass(frozen=True)
@@ -39,11 +54,13 @@ class Account:
               motion and strain, largest difference between energy and work, its time, power of the last row and of the one
               before, energy of the last row
     moments : (K,) [s] at which functions of time change between rows, beside those that they break at
+    met     : by the number of a stop the fastest approach to it
     """
 
     system: System
     moments: Array = field(default_factory=lambda: np.zeros(0))
     numbers: Array = field(default_factory=lambda: np.full(12, np.nan))
+    met: dict[int, Met] = field(default_factory=dict)
 
 
 def add_rows(account: Account, rows: Record, powers: Array) -> Array:
@@ -69,7 +86,7 @@ def add_rows(account: Account, rows: Record, powers: Array) -> Array:
     left_open = numbers[OPEN] + np.cumsum(unsure)
     left = total - numbers[BEGUN] - work
     lost = np.abs(np.diff(left, prepend=numbers[TOTAL] - numbers[BEGUN] - numbers[WORK]))
-    near = np.append(numbers[BESIDE] > 0, _beside_stops(system, rows, steps))
+    near = np.append(numbers[BESIDE] > 0, _beside_stops(account, rows, steps))
     numbers[AT_STOPS] += float(lost[(lost > SURE * unsure) & (near[:-1] | near[1:])].sum())
     sure = np.where(np.abs(left) > SURE * left_open, left, 0.0)
     worst = int(np.argmax(np.abs(sure)))
@@ -89,20 +106,72 @@ def _breaks_between(account: Account, times: Array) -> Array:
     return found
 
 
-def _beside_stops(system: System, rows: Record, steps: Array) -> Array:
-    """(T,) whether an undamped stop may be met in about the steps [s] from row to row that end at each."""
+def _beside_stops(account: Account, rows: Record, steps: Array) -> Array:
+    """(T,) whether an undamped stop may be met in about the steps [s] from row to row that end at each; and take note of
+    the fastest approach to every stop."""
+    system = account.system
     view, met = View(system, rows), np.zeros(rows.time.size, dtype=bool)
     for k, force in enumerate(forces_of(system.scene)):
-        if isinstance(force, JointStop) and _conserves(force):
-            c, reach = measured_values(view, k, COORDINATE), REACHED * steps * np.abs(measured_values(view, k, RATE))
-            met |= force.energy(c - reach) + force.energy(c + reach) > 0
+        if not isinstance(force, JointStop):
+            continue
+        c, rate = measured_values(view, k, COORDINATE), measured_values(view, k, RATE)
+        reach = REACHED * steps * np.abs(rate)
+        near = force.energy(c - reach) + force.energy(c + reach) > 0
+        met |= near & _conserves(force)
+        row = int(np.argmax(np.where(near, np.abs(rate), 0.0)))
+        if near[row] and (k not in account.met or abs(rate[row]) > abs(account.met[k].rate)):
+            own = Record(*(column[row : row + 1].copy() for column in rows))
+            account.met[k] = Met(own, float(c[row]), float(rate[row]))
     return met
 
 
-def unresolved_rebounds(account: Account) -> bool:
-    """Whether bodies have come from undamped stops with another energy than they met them with."""
-    most, at_stops = account.numbers[[MOST, AT_STOPS]]
-    return bool(at_stops > AMISS * most and amiss(account, "", ""))
+def lost_rebounds(account: Account, step: float) -> list[str]:
+    """What tells that bodies come from stops with another energy than that of the scene: in runs of a fixed `step` [s] the
+    stops that are met too shortly for it, and what undamped ones have lost or fed."""
+    forces, most = forces_of(account.system.scene), account.numbers[MOST]
+    found = []
+    for k, met in account.met.items():
+        lasts, returned = _meeting(account.system, forces[k], met)
+        if lasts < RESOLVED * step and returned > REBOUND * most:
+            found.append(
+                f"{forces[k].name!r} is met for about {lasts:.2g} s, which takes steps of {0.1 * lasts:.1g} s or less"
+            )
+    if not found and account.numbers[AT_STOPS] > AMISS * most and amiss(account, "", ""):
+        return ["take a smaller step"]
+    return found
+
+
+def _meeting(system: System, stop: Force, met: Met) -> tuple[float, float]:
+    """How long a stop is met [s], and the energy [J] that comes back, by the mass that moves with it as bodies do that do not
+    bend: half a vibration, as deep as the energy of the approach goes, which damping of a ratio zeta leaves
+    exp(-2 pi zeta / sqrt(1 - zeta^2)) of."""
+    assert isinstance(stop, JointStop)
+    m, k = _mass_before(system, stop, met), stop.stiffness
+    energy = 0.5 * m * met.rate**2
+    if not 0 < energy < np.inf:
+        return np.inf, 0.0
+    soft = k * stop.entry**2 / 6  # stored where the full stiffness begins
+    if energy < soft:
+        depth = (6 * stop.entry * energy / k) ** (1 / 3)
+    else:
+        depth = 0.5 * (stop.entry + np.sqrt(stop.entry**2 + 8 * (energy - soft) / k))
+    ratio = 0.5 * stop.damping / np.sqrt(k * m)
+    returned = energy * np.exp(-2 * np.pi * ratio / np.sqrt(1 - ratio**2)) if ratio < 1 else 0.0
+    return np.pi * depth / abs(met.rate), float(returned)
+
+
+def _mass_before(system: System, stop: JointStop, met: Met) -> float:
+    """[kg], [kg m^2] what moves with the joint coordinate of a stop; infinite where only bending moves it."""
+    scene, place, time, x = system.scene, system.layout, float(met.row.time[0]), met.row.x[0]
+    now = At(scene, place, time, x, np.zeros(place.v_size))
+    total, ends = nothing_on(all_placed(now), place.v_size), stop.place.ends(scene)
+    jets = coordinates(scene, pair(*(total.placed[number] for number in ends)), stop.place)
+    gradient = total.gradient(ends, np.array([jet.first for jet in jets]))
+    bending = np.vstack([np.eye(place.v_size)[place.q_dot(b)] for b in range(len(place.n))])
+    jacobian = np.vstack([evaluate(evaluator(system), time, x, now.v).jacobian, bending])
+    along = gradient @ free_motions(jacobian, total_mass_matrix(scene, place, x))
+    moved = float(np.sum(along**2))
+    return 1 / moved if moved > 0 else np.inf
 
 
 def amiss(account: Account, method: str, remedy: str) -> list[str]:

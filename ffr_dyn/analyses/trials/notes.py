@@ -73,7 +73,8 @@ def _unseen(trial: Trial) -> list[str]:
     if not trial.errors:
         return []
     if "rebounds" in trial.result.attributes:
-        return ["the error told leaves out rebounds from stops, for which the steps are too long; take a smaller step"]
+        lost = trial.result.attributes["rebounds"]
+        return [f"the error told leaves out rebounds from stops, for which the steps are too long: {lost}"]
     if trial.twins or twin_share(trial.method) is None:
         return []
     return [

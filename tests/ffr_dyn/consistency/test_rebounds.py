@@ -55,10 +55,23 @@ def test_a_rebound_that_is_lost_is_told(method):
     assert any("energy of 4.25 J has gone" in note for note in result.attributes["notes"])
 
 
+@pytest.mark.parametrize(("stiffness", "ratio", "step"), [(1e7, 0.03, 1e-3), (1e6, 0.3, 1e-3), (1e4, 0.1, 5e-3)])
+def test_damped_stops_that_are_met_within_few_steps_are_told(stiffness, ratio, step):
+    """They take energy that rows do not tell; half a vibration against them lasts pi sqrt(J / k)."""
+    scene = bouncing(stiffness, damping=2 * ratio * np.sqrt(stiffness * (0.0838 + 0.25)))
+    result = forward(scene, end=1.0, output_step=ROW, method=ROS3(step), check=True)
+    lasts = np.pi * np.sqrt((0.0838 + 0.25) / stiffness)
+    assert lasts < 4 * step
+    assert result.attributes["accuracy"].startswith("step: not known")
+    [note] = [note for note in result.attributes["notes"] if "leaves out rebounds" in note]
+    told = float(note.split("'stop' is met for about ")[1].split(" s")[0])
+    assert told == pytest.approx(lasts, rel=0.25)  # more where it is soft
+
+
 @pytest.mark.parametrize(
     "scene",
-    [bouncing(1e3), bouncing(1e7, lower=-2.0), bouncing(1e5, damping=1e3)],
-    ids=["resolved", "not met", "damped"],
+    [bouncing(1e3), bouncing(1e7, lower=-2.0), bouncing(1e7, damping=5e3), bouncing(1e5, damping=30.0)],
+    ids=["resolved", "not met", "damped", "damped a little"],
 )
 def test_what_is_resolved_or_takes_energy_is_not(scene):
     result = forward(scene, end=END if scene.forces[0].lower == LOWEST else 0.4, output_step=ROW, method=ROS3(1e-3))
