@@ -130,14 +130,15 @@ def _gravity_doubts(scene: Scene) -> list[str]:
 
 
 def _idle(scene: Scene) -> list[str]:
-    """A note on every force that acts on the ground alone."""
+    """Notes on forces that act on the ground alone, and on what others do not do."""
     acts = ((force.name, force.place.markers(scene)) for force in forces_of(scene))
-    return [
+    idle = [
         f"{name!r} acts on {' and '.join(places)} alone, and the ground does not move: it does nothing; give it a marker "
         "of a body"
         for name, places in acts
         if places and all(place.startswith("ground.") for place in places)
     ]
+    return idle + [doubt for force in forces_of(scene) for doubt in force.doubts(scene)]
 
 
 def _uncounted(rows: Constraints, x: Array) -> list[str]:

@@ -136,6 +136,23 @@ def _moving(body: Body) -> FlexibleBody:
     return replace(model, surface=mean_axis_surface(body.frame.model, model, body.frame.C))
 
 
+def unstiffened(force: Any, scene: Scene) -> tuple[str, ...]:
+    """A note where a load over the surface of a second-order body works on no second-order displacement, or on some of it."""
+    body = force.place.of(scene)
+    surface = (body.frame or body).model.surface
+    if surface is None or body.model.stiffening is None or not body.stiffening:
+        return ()
+    has = np.flatnonzero(surface.second.weights.any(axis=(0, 2))) if surface.second is not None else np.zeros(0, int)
+    count = int(has.max(initial=-1)) + 1
+    if count >= body.model.n:
+        return ()
+    of = f"the first {count} of {body.model.n} modes" if count else "none of its modes"
+    return (
+        f"force {force.name!r} stiffens or buckles {of} of {force.body!r}: the surface has a second-order displacement of no "
+        "more; reduce the body without drawn_modes, or give the load at an interface",
+    )
+
+
 def measured_factor(force: Any) -> tuple[Measured, ...]:
     """What a result keeps of the load: its function, where that is no number."""
     return () if is_number(force.function) else FACTOR

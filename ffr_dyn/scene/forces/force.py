@@ -110,6 +110,10 @@ class Force(ABC):
         """InputError when the scene has not what the force needs."""
         self.place.check(scene)
 
+    def doubts(self, scene: Scene) -> tuple[str, ...]:
+        """What it does not do in the scene, and may be meant to, in sentences."""
+        return ()
+
     def drawn(self, scene: Scene) -> dict[str, Any]:
         """What a picture of it needs beside its markers, in JSON values (`ffr_dyn.scene.forces.places.Place.drawn`)."""
         return self.place.drawn(scene)

@@ -26,6 +26,7 @@ from ffr_dyn.scene.forces.distributed import (
     numbers_at,
     second_order,
     surface_of,
+    unstiffened,
 )
 from ffr_dyn.scene.forces.force import Force
 from ffr_dyn.scene.forces.places import OnBody
@@ -76,6 +77,9 @@ class NodalForces(Force):
     @cached_property
     def place(self) -> OnBody:
         return OnBody(f"force {self.name!r}", self.body, self.axes, measured_factor(self))
+
+    def doubts(self, scene: Scene) -> tuple[str, ...]:
+        return unstiffened(self, scene)
 
     def drawn(self, scene: Scene) -> dict[str, Any]:
         """Forces at few of the points, each with those of the points that are nearest to it (`arrows_on_surface`)."""

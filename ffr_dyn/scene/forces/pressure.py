@@ -25,6 +25,7 @@ from ffr_dyn.scene.forces.distributed import (
     numbers_at,
     second_order,
     surface_of,
+    unstiffened,
 )
 from ffr_dyn.scene.forces.force import Force
 from ffr_dyn.scene.forces.places import OnBody
@@ -33,6 +34,8 @@ from ffr_prep.body import FlexibleBody, Surface
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 from ffr_prep.common.registry import choice
+
+_NOTHING = 1e-3  # of what it does on one side: what is left of it where both sides are pressed
 
 
 @register_force
@@ -78,6 +81,24 @@ class Pressure(Force):
     @cached_property
     def place(self) -> OnBody:
         return OnBody(f"force {self.name!r}", self.body, measured=measured_factor(self))
+
+    def doubts(self, scene: Scene) -> tuple[str, ...]:
+        if not self._cancels(self.place.of(scene).model):
+            return unstiffened(self, scene)
+        return (
+            f"force {self.name!r} does next to nothing: over all of the surface that it acts on it cancels, as on both faces "
+            f"of a plate, and the modes of {self.body!r} show none of it; give the triangles of the side that it acts on",
+        )
+
+    def _cancels(self, body: FlexibleBody) -> bool:
+        """Whether next to nothing is left of what it does on the triangles that face as the first one does."""
+        surface = surface_of(body, self.name)
+        chosen = self._chosen(body, surface)
+        a, b, c = np.moveaxis(surface.points[surface.triangles[chosen]], 1, 0)
+        normal = np.cross(b - a, c - a)
+        one_side = replace(self, triangles=chosen[normal @ normal[0] > 0])
+        whole, part = (_sizes(load.integrals(body).constant, body) for load in (self, one_side))
+        return bool((whole <= _NOTHING * part).all())
 
     def drawn(self, scene: Scene) -> dict[str, Any]:
         """The pressure at few of the triangles (`arrows_on_surface`)."""
@@ -168,3 +189,8 @@ class Pressure(Force):
                 f'`ffr-prep reduce --region "{region}=plane z=0"` keeps one'
             )
         return np.array(known[region], np.int64)
+
+
+def _sizes(loads: Array, body: FlexibleBody) -> Array:
+    """(3,) force, moment and the root of twice the strain energy of modal forces, of loads (6 + n,)."""
+    return np.array([np.linalg.norm(part) for part in (loads[:3], loads[3:6], loads[6:] / np.sqrt(body.omega2))])

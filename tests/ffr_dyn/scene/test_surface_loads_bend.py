@@ -5,6 +5,7 @@ Theory of Elastic Stability, art. 1.11): of a force that keeps its direction the
 one that turns with the end by F (sin kL - kL cos kL) / (k P).
 """
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -125,3 +126,45 @@ def test_the_integrals_of_a_load_are_found_once(monkeypatch):
     monkeypatch.setattr(fd.Pressure, "integrals", lambda self, body: counted.append(body) or whole(self, body))
     fd.static(clamped(column(), **pressed(0.5 * CRITICAL, follower=True)))
     assert 1 <= len(counted) < 10  # of forms of the body, and not of the differences of every tangent
+
+
+def told(body: fp.FlexibleBody, force) -> list[str]:
+    scene = fd.Scene((fd.Body(body.name, body),), forces=(force,))
+    return [note for note in fd.assemble(scene).notes if repr(force.name) in note]
+
+
+@cache
+def plate() -> fp.FlexibleBody:
+    shell = fp.Shell(0.002, STEEL)
+    model = fp.from_frame(
+        fp.named(
+            fp.panel([(0, 0, 0), (0.4, 0, 0), (0.4, 0.3, 0), (0, 0.3, 0)], shell, elements=(3, 2)), root=(0, 0, 0)
+        ),
+        [fp.InterfaceRegion("root")],
+    )
+    return fp.reduce(model, fp.Request(name="plate", reference=fp.FixedTo("root"), reduction=fp.CraigBampton(6)))
+
+
+@pytest.mark.parametrize("follower", [False, True])
+def test_a_pressure_on_both_faces_of_a_plate_is_told_to_do_nothing(follower):
+    wind = fd.Pressure("wind", "plate", 2e3, follower=follower)
+    [note] = told(plate(), wind)
+    assert "does next to nothing" in note
+
+    def above(places):
+        return places[:, 2] > 0
+
+    mended = fd.Pressure("wind", "plate", 2e3, triangles=above, follower=follower)
+    assert not told(plate(), mended)
+    assert np.abs(mended.integrals(plate()).constant[6:]).max() > 1.0
+
+
+def test_a_load_over_modes_without_second_order_is_told():
+    line = fp.polyline([(0, 0, 0), (LENGTH, 0, 0)], fp.Member(fp.circle(0.02), STEEL), elements=3)
+    model = fp.from_frame(fp.named(line, root=(0, 0, 0)), [fp.InterfaceRegion("root")])
+    request = fp.Request(name="column", reference=fp.FixedTo("root"), reduction=fp.CraigBampton(4))
+    push = fd.NodalForces("push", "column", [3], [(1.0, 0, 0)])
+    [note] = told(fp.reduce(model, replace(request, drawn_modes=2)), push)
+    assert "stiffens or buckles the first 2 of 4 modes" in note
+    assert not told(fp.reduce(model, request), push)
+    assert not told(fp.reduce(model, replace(request, linear=True)), push)
