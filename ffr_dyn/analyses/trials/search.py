@@ -57,9 +57,9 @@ def _next(count: int, excess: float, leap: int) -> int:
 
 
 def _excess(trial: Trial, ringing: set[str], earlier: Sequence[Trial]) -> float:
-    """The largest error over range of what a trial is to keep; infinite where no error could be told. Outputs that ring, for
-    which shorter steps have ceased to help, are added to those that do."""
-    if not trial.errors:
+    """The largest error over range of what a trial is to keep; infinite where no error could be told, or rebounds from stops
+    are lost. Outputs that ring, for which shorter steps have ceased to help, are added to those that do."""
+    if not trial.errors or "rebounds" in trial.result.attributes:
         return np.inf
     for before in (one for one in earlier[-1:] if one.errors):
         driving = [name for name in trial.errors if DRIVING.search(name)]
