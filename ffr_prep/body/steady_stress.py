@@ -50,9 +50,9 @@ def shear_doubt(provenance: Mapping[str, Any]) -> str | None:
         return None
     named = ", ".join(repr(name) for name in sections)
     return (
-        f"section{'s' * (len(sections) > 1)} {named}: given by constants, the stress is that of a rectangle of the same "
-        "second moments, and holds no shear of transverse forces, nor of torque unless J = Iy + Iz; a shape (rectangle, "
-        "circle, tube, i) holds both"
+        f"the stress of section{'s' * (len(sections) > 1)} {named}, given by constants, is that of a rectangle with the same "
+        "second moments, without the shear of transverse forces, and without that of torque unless J = Iy + Iz; a shape "
+        "(rectangle, circle, tube, i) has both"
     )
 
 
