@@ -27,6 +27,7 @@ from ffr_gallery.numerical_damping import numerical_damping
 from ffr_gallery.redundant_bricard import redundant_bricard
 from ffr_gallery.reference_conditions import reference_conditions
 from ffr_gallery.shared_step import shared_step
+from ffr_gallery.short_stop import short_stop
 from ffr_gallery.singular_four_bar import singular_four_bar
 from ffr_gallery.spin_up import spin_up
 from ffr_gallery.start_shock import start_shock
@@ -51,6 +52,7 @@ EXHIBITS: dict[str, Callable[[], Exhibit]] = {
     "joint-damper": joint_damper,
     "joint-friction": joint_friction,
     "stiff-bushing": stiff_bushing,
+    "short-stop": short_stop,
     "start-shock": start_shock,
     "fast-driver": fast_driver,
     "coarse-rows": coarse_rows,

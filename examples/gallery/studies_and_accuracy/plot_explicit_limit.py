@@ -4,7 +4,7 @@ Where methods fail: the explicit limit
 
 The classical Runge-Kutta method is stable up to steps of 2.828 / w, w the fastest vibration of the *assembled* scene.
 With a step beyond it the vibration grows until the run stops with a sentence; linearly implicit methods bear any step.
-One of the twenty-two exhibits that `ffr-dyn stability` computes: drift, Baumgarte's gains, singular positions, stiff
+One of the twenty-three exhibits that `ffr-dyn stability` computes: drift, Baumgarte's gains, singular positions, stiff
 joints, start shocks ...
 
 Source: E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, 2nd ed. 1996, section IV.2: the stability function
