@@ -84,7 +84,7 @@ def cantilever(name: str, length: float, section: Section, material: Material, m
 def flat(d: float) -> Section:
     """Area and bending in the plane of a round bar of diameter d [m], but 1.7 times as stiff across: no frequency twice."""
     round_bar = circle(d)
-    return replace(round_bar, name=f"flat {d:g} m", Iy=1.7 * round_bar.Iz, mass_moments=None, outline=())
+    return replace(round_bar, name=f"flat {d:g} m", Iy=1.7 * round_bar.Iz, mass_moments=None, outline=(), shear=())
 
 
 def block(name: str, mass: float, size: float) -> FlexibleBody:

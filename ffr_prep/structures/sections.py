@@ -71,6 +71,8 @@ class Section:
         if not self.outline:
             sides = (math.sqrt(12 * self.Iz / self.A), math.sqrt(12 * self.Iy / self.A))
             object.__setattr__(self, "outline", (_corners(*sides),))
+        if [len(polygon) for polygon in self.outline] != [len(of) for of in self.shear]:
+            object.__setattr__(self, "shear", ())  # not of this outline
         _check_mass_moments(self)
 
     @property

@@ -181,6 +181,10 @@ def test_shear_in_a_thick_tube_balances_its_force():
     assert at_side[0] == pytest.approx((S / (section.Iz * 2 * (R - r)), 0.0), abs=1e-9)
 
 
+def test_a_section_of_another_outline_does_not_know_its_shear():
+    assert replace(circle(0.05), outline=()).shear == ()
+
+
 def test_a_section_by_its_constants_tells_that_its_shear_is_not_known():
     rail = general("rail", A=1e-3, Iy=1e-7, Iz=2e-7, J=5e-8)
     body = reduced(straight(rail, LENGTH, 1))
