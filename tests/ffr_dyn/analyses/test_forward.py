@@ -175,6 +175,7 @@ def test_a_check_can_be_left_out_or_asked_for():
     assert forward(driven(), **SPAN, method=ROS2(1e-3), check=True).attributes["errors"]
 
 
+@pytest.mark.slow
 def test_a_method_that_chooses_its_steps_knows_its_error(truth):
     found = forward(driven(), **SPAN, method=AdaptiveROS3(tolerances(1e-4)))
     true = truth(driven())

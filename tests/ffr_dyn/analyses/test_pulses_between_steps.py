@@ -91,6 +91,7 @@ def test_a_python_function_is_looked_into(method):
     assert 0.3 * error <= told <= 5 * error
 
 
+@pytest.mark.slow
 def test_a_motion_that_jerks_between_rows_is_followed():
     jerk = formula(f"0.1 * exp(-((t - {AT}) / 1e-3)**2)")
     scene = shaken("driver", jerk).scene

@@ -85,6 +85,7 @@ def test_a_stopped_run_goes_on_to_the_same_bits(tmp_path, whole, at):
     assert_same_bits(load_result(path), whole)
 
 
+@pytest.mark.slow
 def test_a_run_to_a_later_end_is_the_long_run(tmp_path, whole):
     path = tmp_path / "run.nc"
     integrate(SCENE, **SETTINGS | {"end": 0.37}, path=path)

@@ -277,6 +277,7 @@ def test_of_many_scenes(name):
     MANY(given(drafts(**drawn, most=20))(law))()
 
 
+@pytest.mark.slow
 def test_a_driven_joint_is_as_on_paper_in_any_tree():
     def law(draft: Draft) -> None:
         scene = tree(replace(draft, joints=((-1, "revolute"), *draft.joints[1:])))

@@ -266,6 +266,7 @@ def test_a_wrench_at_a_marker_works_on_its_point_and_its_rotation(load):
 # ---- motions and statics ------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_bent_spinning_body_keeps_its_energy_and_momenta():
     model, _ = bending_cloud(4, size=0.3, stiffness=10.0)
     start = np.array([0.08, -0.06, 0.05, 0.02])

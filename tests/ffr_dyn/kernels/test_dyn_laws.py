@@ -111,6 +111,7 @@ def test_no_elastic_frequency_destabilises_the_implicit_methods(method):
     np.testing.assert_allclose(result["two.a.position"], other["two.a.position"], atol=2e-4)
 
 
+@pytest.mark.slow
 def test_stiff_modes_that_move_a_joint_do_not_make_ros2_drift(beam_in_three_frames):
     """Four links clamped to their frames at the near end: the far joints move with stiff elastic modes.
 

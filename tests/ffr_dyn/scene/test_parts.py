@@ -224,6 +224,7 @@ def test_beam_elements_of_parts_are_numbered_through():
         np.testing.assert_allclose(section_forces(four, "beam", element), expected, atol=2e-3)
 
 
+@pytest.mark.slow
 def test_pictures_join():
     """At any scale: the points that two parts share are drawn at one place, but for the square of the elastic rotation."""
     two, one = (film(run(bar(n)), 4, scale=5.0) for n in (2, None))

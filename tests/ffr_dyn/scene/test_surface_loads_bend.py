@@ -116,6 +116,7 @@ def test_a_body_in_its_mean_axis_form_keeps_the_second_order_of_its_loads():
     assert deflection(with_mean_axis_bodies(scene)) == pytest.approx(deflection(scene), rel=1e-9)
 
 
+@pytest.mark.slow
 def test_pressure_on_parts_is_that_on_the_whole():
     one, two = (deflection(clamped(body, **pressed(0.5 * CRITICAL, True))) for body in (column(), column(2)))
     assert two == pytest.approx(one, rel=1e-3)

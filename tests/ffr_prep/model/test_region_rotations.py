@@ -241,6 +241,7 @@ def test_lateral_buckling_of_a_cantilever(make, off):
     assert critical_load(body, body.stiffening[FORCE + 1]) == pytest.approx(4.0126 * unit, rel=off)
 
 
+@pytest.mark.slow
 def test_buckling_of_a_shaft_by_torque():
     """M = pi EI/L for a cantilever under a semitangential torque (H. Ziegler, Principles of Structural Stability, 1968)."""
     section = circle(0.02)

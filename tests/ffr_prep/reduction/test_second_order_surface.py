@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 from itertools import permutations
 
 import numpy as np
@@ -39,11 +40,15 @@ def exact(monkeypatch):
 
 @pytest.fixture(scope="module")
 def made():
-    """Bodies of all kinds under all conditions, with fields as they are found."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(second_order, "TOLERANCE", 1e-13)
-        kinds = {**BODIES, "plates": plate}
-        return {kind: {reference: make(reference) for reference in REFERENCES} for kind, make in kinds.items()}
+    """The body of a kind under some conditions, with its field as it is found, made when it is first asked for."""
+
+    @cache
+    def of(kind, reference):
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(second_order, "TOLERANCE", 1e-13)
+            return {**BODIES, "plates": plate}[kind](reference)
+
+    return of
 
 
 def at(*points):
@@ -133,7 +138,7 @@ def test_interfaces_move_as_the_load_matrices_say(kind, kinds, reference):
 @pytest.mark.slow
 def test_the_drawn_face_of_a_rigid_interface_moves_as_one_piece(made):
     """By u_2 and the rotation vector theta_2 of the interface, and phi x (phi x r) / 2."""
-    body = made["solid, rigid"][MEAN]
+    body = made("solid, rigid", MEAN)
     for k, interface in enumerate(body.interfaces):
         near = np.flatnonzero(np.abs((body.surface.points - interface.position) @ rotation(5)[:, 0]) < 1e-9)
         assert near.size >= 8
@@ -163,7 +168,7 @@ ACCURACY = {
 @pytest.mark.parametrize(("old", "new"), list(permutations(REFERENCES, 2)), ids=lambda of: type(of).__name__)
 @pytest.mark.parametrize("kind", ACCURACY)
 def test_the_converted_surface_is_that_of_a_direct_reduction(made, exact, kind, old, new):
-    converted, direct = with_reference(made[kind][old], new), made[kind][new]
+    converted, direct = with_reference(made(kind, old), new), made(kind, new)
     signs = np.sign(np.einsum("pci,pci->i", converted.surface.Phi, direct.surface.Phi))
     found = all_pairs(converted.surface.second) * np.outer(signs, signs) * sizes(direct)
     expected = all_pairs(direct.surface.second) * sizes(direct)
@@ -250,7 +255,7 @@ def test_parts_stay_together_whichever_follows_the_other(exact):
 @pytest.mark.parametrize("kind", [kind for kind in ACCURACY if kind != "beams, mean"])
 def test_an_added_point_moves_alike_in_every_frame(made, exact, kind):
     """Converted with its load matrices, or added to the converted body."""
-    body = made[kind][FIXED]
+    body = made(kind, FIXED)
     place = body.surface.points[len(body.surface.points) // 3]
     one = with_reference(pointed(body, "p", place), MEAN).stiffening[-6:]
     other = pointed(with_reference(body, MEAN), "p", place).stiffening[-6:]
@@ -261,7 +266,7 @@ def test_an_added_point_moves_alike_in_every_frame(made, exact, kind):
 def test_an_added_point_turns_with_a_rigid_face(made):
     """On the face of a rigid interface all neighbours in the face, and behind it, turn with it to first order; the rotation
     vector to second order is that of the interface but for what strains behind it do."""
-    body = made["solid, rigid"][MEAN]
+    body = made("solid, rigid", MEAN)
     interface, K = body.interfaces[1], body.stiffening[18:24]
     near = np.argmin(np.linalg.norm(body.surface.points - interface.position, axis=1))
     r = body.surface.points[near] - interface.position
@@ -275,7 +280,7 @@ def test_an_added_point_turns_with_a_rigid_face(made):
 
 
 def test_a_point_without_second_order_is_refused(made):
-    body = made["solid, mean"][MEAN]
+    body = made("solid, mean", MEAN)
     old = replace(body, surface=replace(body.surface, second=None))
     with pytest.raises(BodyError, match="no second-order displacement of its surface, which the point 'p' needs"):
         pointed(old, "p", old.centre_of_mass)
@@ -287,7 +292,7 @@ def test_a_point_without_second_order_is_refused(made):
 
 def test_few_shapes_tell_all_pairs(made):
     """Within the tolerance of the largest displacement, for every state of one energy."""
-    full = made["beams"][FIXED]
+    full = made("beams", FIXED)
     field = full.surface.second
     i, j = np.triu_indices(full.n)
     kept = second_order.compressed(all_pairs(field)[..., i, j], full.omega2)

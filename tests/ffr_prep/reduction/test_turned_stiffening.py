@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -121,12 +122,8 @@ BODIES = {
 
 @pytest.fixture(scope="module")
 def made():
-    return {kind: {reference: make(reference) for reference in REFERENCES} for kind, make in BODIES.items()}
-
-
-@pytest.fixture(scope="module")
-def blocks(made):
-    return made["solid, mean"]
+    """The body of a kind under some conditions, made when it is first asked for."""
+    return cache(lambda kind, reference: BODIES[kind](reference))
 
 
 @pytest.fixture(scope="module")
@@ -158,7 +155,7 @@ def assert_equal(body, expected, loads, rtol):
 @pytest.mark.parametrize("kind", BODIES)
 def test_converting_is_reducing_in_the_new_frame(made, kind, old, new):
     """For every load, forces and moments, solids, beams and both, on rigid and mean interfaces: to rounding."""
-    assert_equal(with_reference(made[kind][old], new), made[kind][new], slice(None), 1e-9)
+    assert_equal(with_reference(made(kind, old), new), made(kind, new), slice(None), 1e-9)
 
 
 @pytest.mark.slow
@@ -171,18 +168,18 @@ def test_converting_plates_is_nearly_reducing_in_the_new_frame():
 
 
 @pytest.mark.parametrize("new", REFERENCES[1:], ids=str)
-def test_back_and_forth_is_the_identity(blocks, new):
-    body = blocks[FIXED]
+def test_back_and_forth_is_the_identity(made, new):
+    body = made("solid, rigid", FIXED)
     assert_equal(with_reference(with_reference(body, new), FIXED), body, slice(None), 1e-8)
 
 
-def test_the_way_to_a_frame_does_not_matter(blocks):
-    body = blocks[FIXED]
+def test_the_way_to_a_frame_does_not_matter(made):
+    body = made("solid, rigid", FIXED)
     assert_equal(with_reference(with_reference(body, CHORD), MEAN), with_reference(body, MEAN), slice(None), 1e-8)
 
 
-def test_a_uniform_acceleration_stresses_nothing_in_the_mean_axis_frame(blocks):
-    converted = with_reference(blocks[FIXED], MEAN)
+def test_a_uniform_acceleration_stresses_nothing_in_the_mean_axis_frame(made):
+    converted = with_reference(made("solid, rigid", FIXED), MEAN)
     scale = np.sqrt(np.outer(converted.omega2, converted.omega2))
     size = np.abs(converted.stiffening / scale).max(axis=(1, 2))
     assert size[:6].max() < 1e-9 * size[6:12].max()
@@ -234,20 +231,22 @@ def test_the_command_line_leaves_the_load_matrices_out(rods, tmp_path):
     assert load_body(tmp_path / "c.ffr").stiffening is None
 
 
-def test_points_that_were_added_turn_like_others(blocks):
+def test_points_that_were_added_turn_like_others(made):
     """As far as the surface, which is kept in fewer numbers, knows their second order."""
-    at = blocks[FIXED].centre_of_mass
-    converted = with_reference(with_point(blocks[FIXED], "middle", at), MEAN)
-    direct = with_point(with_reference(blocks[FIXED], MEAN), "middle", at)
+    at = made("solid, rigid", FIXED).centre_of_mass
+    converted = with_reference(with_point(made("solid, rigid", FIXED), "middle", at), MEAN)
+    direct = with_point(with_reference(made("solid, rigid", FIXED), MEAN), "middle", at)
     scale = np.sqrt(np.outer(direct.omega2, direct.omega2))
     off, size = ((K / scale)[-6:] for K in (converted.stiffening - direct.stiffening, direct.stiffening))
     assert np.abs(off).max() < 1e-3 * np.abs(size).max()
-    np.testing.assert_array_equal(converted.stiffening[:-6], with_reference(blocks[FIXED], MEAN).stiffening)
+    np.testing.assert_array_equal(
+        converted.stiffening[:-6], with_reference(made("solid, rigid", FIXED), MEAN).stiffening
+    )
 
 
-def test_points_without_matrices_hold_nothing(blocks):
+def test_points_without_matrices_hold_nothing(made):
     """As bodies of earlier versions have them."""
-    body = with_point(blocks[FIXED], "middle", blocks[FIXED].centre_of_mass)
+    body = with_point(made("solid, rigid", FIXED), "middle", made("solid, rigid", FIXED).centre_of_mass)
     stiffening = np.array(body.stiffening)
     stiffening[-6:] = 0.0
     body = replace(body, stiffening=stiffening)

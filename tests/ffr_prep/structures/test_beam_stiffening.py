@@ -125,6 +125,7 @@ def test_pendulum_against_the_exact_beam(reference):
     np.testing.assert_allclose(result["rod.tip.position"][1:, :2], exact, atol=3e-5)
 
 
+@pytest.mark.slow
 def test_slider_crank_with_a_rod_under_pressure():
     """Mid-rod deflection: the geometrically exact beam, computed independently (see the data file), to 0.4 % of its peak."""
     frame = polyline([(0, 0, 0), (0.3, 0, 0)], Member(thin(circle(0.006)), STEEL, (0, 1.0, 0)), elements=24)
@@ -143,6 +144,7 @@ def test_slider_crank_with_a_rod_under_pressure():
     np.testing.assert_allclose(deflection, np.interp(result.time, *exact.T), atol=4e-3 * peak)
 
 
+@pytest.mark.slow
 def test_spin_up_of_a_cantilever():
     """Spin-up to 6 rad/s in 15 s, above the first frequency of the beam: tip deflection in the rotating frame.
 
