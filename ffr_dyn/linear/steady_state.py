@@ -36,7 +36,7 @@ from ffr_dyn.equations.layout import Layout, moved, to_body_axes, to_global_axes
 from ffr_dyn.equations.placed import Sums, all_placed, nothing_on
 from ffr_dyn.equations.spinning import spinning
 from ffr_dyn.equations.statics import balance, damping
-from ffr_dyn.functions.rotation import from_vector, product, rotation_matrix
+from ffr_dyn.functions.rotation import from_vector, product, rotation_matrix, skew
 from ffr_dyn.linear.hill import harmonics
 from ffr_dyn.linear.turning_on import turning_on
 from ffr_dyn.scene.force_kinds import forces_of
@@ -267,8 +267,13 @@ def _add_by_differences(total: Sums, D: Array, screws: Screws, now: At, force: F
     def rated(of: Array) -> Array:
         return _derivative(lambda rate: given(replace(now, v=of + to_global_axes(place, now.x, rate))), 1.0, still.size)
 
-    total.forces[:] += added(still)
+    here = added(still)
+    total.forces[:] += here
     total.tangent[:] += _derivative(added, STEP, still.size)
+    for b in range(len(place.n)):  # they are in the axes of bodies that are moved, the tangent is in those at x
+        shift, turn = place.R_dot(b), place.omega(b)
+        total.tangent[shift, turn] -= skew(here[shift])
+        total.tangent[turn, turn] -= 0.5 * skew(here[turn])
     D += rated(still) - rated(now.v)
 
 

@@ -80,6 +80,26 @@ def test_the_exact_state_matrix_is_that_of_differences():
     assert np.abs(A - exact).max() < 1e-5 * np.abs(exact).max()
 
 
+def drag(name: str, marker: str) -> fd.Load:
+    """A Python force and moment against the velocity of a point."""
+
+    def against(t, state):
+        velocity = np.asarray(state.velocity(marker))
+        return np.concatenate([-3.0 * velocity, -0.2 * velocity])
+
+    return fd.Load(name, marker, function=against)
+
+
+def test_python_forces_against_a_velocity_have_the_exact_state_matrix_too():
+    """Of a rod that a motor turns through what drags at its end, and so in a steady motion under a large force."""
+    assembled = assemble(in_space(rotor(50.0, stiffening=True, loads=(drag("air", "rod.b"),))))
+    found = steady_state(assembled, 0.0)
+    near = chart(evaluator(assembled.system), 0.0, found.x, found.v)
+    A, _ = state_matrix(near)
+    exact = replace(found, Z=near.Z)
+    np.testing.assert_allclose(steady_matrix(exact, reduced(exact)), A, atol=1e-8 * np.abs(A).max())
+
+
 def test_dampers_to_the_ground_push_what_turns():
     """A whirling mass of internal and external damping c_i, c_e: K of the turning axes has the skew part c_e Omega."""
     c, speed = 4.0, 30.0
