@@ -235,7 +235,12 @@ def linearised(
     evaluate(at, time, assembled.x, assembled.v)
     unit = main_parts(parts) / np.sqrt(np.maximum((np.abs(solved.parts) ** 2).sum(axis=(0, 1)), 1e-300))
     strained = prestrained(*where, assembled.x, solved.values, unit)
-    notes = (*assembled.notes, *_notes(near, steady, solved.values), *checked("linearise", assembled, at.record))
+    notes = (
+        *assembled.notes,
+        *_notes(near, steady, solved.values),
+        *solved.notes,
+        *checked("linearise", assembled, at.record),
+    )
     notes = (*notes, *told(strained, leading[strained.mode]))
     driven = tuple(driver.name for driver in scene.drivers)
     return Linearisation(

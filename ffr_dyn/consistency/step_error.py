@@ -79,6 +79,7 @@ NEVER = (
 )
 FIRST_ROWS = 2  # in which what a twin shows may be larger than ever after
 BEYOND = 0.25  # of a row, up to where steps are looked at after the first
+SLIGHT = 1e-6  # of the size of a scene: points that move by no more are deflected, they do not travel
 SEEN = 1e-6  # of the range, below which it is not looked for
 ENDED_BY = "ended_by"  # attribute: the event that has ended a run, whose last row is of that moment then
 FULL, FEW = 0.3, 2  # of the largest, up to where a growth is even; rows in each third of its decades
@@ -86,11 +87,13 @@ FULL, FEW = 0.3, 2  # of the largest, up to where a growth is even; rows in each
 
 @dataclass(frozen=True)
 class StepError:
-    """Of an output, in its unit and as a part of its range; `vibrates` where most of it is vibration."""
+    """Of an output, in its unit and as a part of its range; `vibrates` where most of it is vibration, and `faded` where the
+    output is nothing but this error (`ffr_dyn.analyses.trials.faded`)."""
 
     error: float
     of_range: float
     vibrates: bool
+    faded: bool = False
 
 
 @dataclass(frozen=True)
@@ -388,13 +391,29 @@ def _spans_and_sizes(run: Result) -> tuple[dict[str, float], dict[str, float]]:
 
 def _rounding(run: Result, sizes: dict[str, float]) -> Callable[[str], float]:
     """Of a unit, what is rounding in a scene of this mass, length and speed, such as the acceleration of a pivot at rest."""
-    lasts, length, force = float(np.ptp(run.time)), sizes["position"], sizes.get("force", 0.0)
+    natural_of = _natural(run, sizes, sizes.get("force", 0.0))
+    return lambda unit: ROUNDING * natural_of(unit)
+
+
+def natural_units(run: Result) -> Callable[[str], float]:
+    """Of a unit, what the mass, length and speed of a scene make of it; zero where nothing moves. Its forces do not count."""
+    return _natural(run, _spans_and_sizes(run)[1], 0.0)
+
+
+def range_of(values: Array) -> float:
+    """Of a history (T, ...) the largest range of a component."""
+    known = filled(values.reshape(len(values), -1))
+    return float(np.ptp(known, axis=0).max(initial=0.0)) if len(known) else 0.0
+
+
+def _natural(run: Result, sizes: dict[str, float], force: float) -> Callable[[str], float]:
+    lasts, length = float(np.ptp(run.time)), sizes["position"]
     speed = max(sizes.get("velocity", 0.0), sizes.get("omega_bar", 0.0) * length, length / lasts if lasts > 0 else 0.0)
     if not speed > 0:
         return lambda unit: 0.0
     time = length / speed
     mass = max(run.attributes.get("mass", 0.0), force * time**2 / length)
-    return cache(lambda unit: ROUNDING * natural(unit, mass, length, time))
+    return cache(lambda unit: natural(unit, mass, length, time))
 
 
 def _floors_at_rest(run: Result, sizes: dict[str, float]) -> dict[str, float]:

@@ -22,7 +22,9 @@ import numpy as np
 from ffr_prep.common.arrays import Array
 
 PRESENT = 1e-7  # of a harmonic, relative to the means of both coordinates: no rounding
-RESIDUAL, MOST = 1e-8, 8  # of the equations beyond the last harmonic, relative; harmonics on either side, at most
+RESIDUAL = 1e-8  # of the equations beyond the last harmonic, relative
+HARMONICS = (*range(1, 9), 12, 16, 24, 32, 48)  # on either side
+ANYHOW, LARGEST = 8, 800  # harmonics of any machine; rows of a determinant with more
 SAME, ALIKE = 1e-6, 0.5  # of eigenvalues and shapes of one mode that is found twice
 
 
@@ -45,11 +47,13 @@ class Varying:
 
 @dataclass(frozen=True)
 class Hill:
-    """values (2 d,) [1/s] and parts (2 h + 1, d, 2 d) of the modes, at the harmonics step (-h ... h) of the rate."""
+    """values (2 d,) [1/s] and parts (2 h + 1, d, 2 d) of the modes, at the harmonics step (-h ... h) of the rate, and what is
+    left of the equations beyond the last, relative."""
 
     values: Array
     parts: Array
     step: int
+    left: float
 
 
 def harmonics(over_a_turn: Array) -> Array:
@@ -59,13 +63,14 @@ def harmonics(over_a_turn: Array) -> Array:
 
 
 def hill(of: Varying) -> Hill:
-    """All modes, two for each coordinate."""
-    step = of.step
-    for h in range(1, MOST + 1):
-        values, parts = _distinct(*_solved(of, step, h), step * of.rate, 2 * of.K.shape[1])
-        if _left_open(of, step, values, parts) <= RESIDUAL:
+    """All modes, two for each coordinate. What turns slowly beside its vibrations takes many harmonics."""
+    step, count = of.step, 2 * of.K.shape[1]
+    for h in (h for h in HARMONICS if h <= ANYHOW or (2 * h + 1) * count <= LARGEST):
+        values, parts = _distinct(*_solved(of, step, h), step * of.rate, count)
+        left = _left_open(of, step, values, parts)
+        if left <= RESIDUAL:
             break
-    return Hill(*_centred(values, parts, step * of.rate), step)
+    return Hill(*_centred(values, parts, step * of.rate), step, left)
 
 
 def _coefficient(of: Array, k: int) -> Array:

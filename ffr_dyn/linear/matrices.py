@@ -21,6 +21,13 @@ from ffr_dyn.linear.steady_state import Steady
 from ffr_dyn.linear.whirl import parted
 from ffr_prep.common.arrays import Array
 
+TOLD = 1e-4  # of frequencies that more harmonics would change, relative
+CUT = (
+    "what turns and its supports change so much with the angle, and turn so slowly, that modes take more harmonics than "
+    "there is room for: their frequencies may be off by up to {:.2g} of their size. Turn faster, take bodies with fewer "
+    "modes, or linearise the scene at rest at several angles"
+)
+
 
 @dataclass(frozen=True)
 class Reduced:
@@ -36,12 +43,19 @@ class Modes:
 
     parts : (2 h + 1, d, 2 d) of y = exp(value t) sum_k parts[h + k] exp(i k shift t)
     shift : [rad/s], 0 where nothing varies
+    left  : of the equations of what varies beyond the last harmonic, relative
     """
 
     values: Array
     parts: Array
     free: int
     shift: float
+    left: float = 0.0
+
+    @property
+    def notes(self) -> list[str]:
+        """Of modes that take more harmonics than there is room for."""
+        return [CUT.format(self.left)] if self.left > TOLD else []
 
 
 def reduced(found: Steady) -> Reduced:
@@ -62,7 +76,7 @@ def modes_of(found: Steady) -> Modes:
     values, parts, h = all_of.values[order], all_of.parts[..., order], len(all_of.parts) // 2
     values[: mean.free], parts[..., : mean.free] = 0.0, 0.0
     parts[h, :, : mean.free] = mean.vectors[:, : mean.free]
-    return Modes(values, parts, mean.free, step * varying.rate)
+    return Modes(values, parts, mean.free, step * varying.rate, all_of.left)
 
 
 def _parted(found: Steady, of: Eigen) -> Array:

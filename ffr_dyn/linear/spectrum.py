@@ -37,6 +37,7 @@ class Spectrum:
     seen  : (m,) [rad/s] frequencies from the ground, positive of forward whirls
     whirl : (m,) share of the amplitude that whirls so (see `ffr_dyn.linear.whirl`)
     body  : (m,) number of the body that moves most
+    notes : on the modes, and on the steady motion
     """
 
     found: Steady
@@ -46,6 +47,7 @@ class Spectrum:
     seen: Array
     whirl: Array
     body: Array
+    notes: tuple[str, ...]
 
     @property
     def speed(self) -> Array:
@@ -94,7 +96,7 @@ def spectrum(found: Steady) -> Spectrum:
     machine = found.machine
     rates = rates_of(values, len(parts), of.shift)
     seen, whirl, body = whirls(machine.system.scene, machine.place, machine.screws, found.x, rates, parts)
-    return Spectrum(found, values, parts, of.shift, seen, whirl, body)
+    return Spectrum(found, values, parts, of.shift, seen, whirl, body, (*found.notes, *of.notes))
 
 
 def rates_of(values: Array, count: int, shift: float) -> Array:

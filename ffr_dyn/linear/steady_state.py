@@ -11,7 +11,8 @@ free to go on turning has no stiffness and stays where it is. Above critical spe
 minimum, so the state is followed from rest where Newton's method does not reach it at once, and not sought downhill.
 
 A scene that turns meets its ground, gravity and bearings anew at every angle. Rows that then do not hold are no
-steady motion; forces and stiffness that vary are taken as their means of a turn, and a note says so. How stiffness and
+steady motion; forces and stiffness that vary are taken as their means of a turn, of bodies at several speeds of so many that
+each has come round, and a note says so. How stiffness and
 damping vary is kept by its harmonics, for the modes (`ffr_dyn.linear.hill`).
 """
 
@@ -35,7 +36,7 @@ from ffr_dyn.equations.layout import Layout, moved, to_body_axes, to_global_axes
 from ffr_dyn.equations.placed import Sums, all_placed, nothing_on
 from ffr_dyn.equations.spinning import spinning
 from ffr_dyn.equations.statics import balance, damping
-from ffr_dyn.functions.rotation import from_vector, product, rotation_matrix
+from ffr_dyn.functions.rotation import from_vector, product, rotation_matrix, skew
 from ffr_dyn.linear.hill import harmonics
 from ffr_dyn.linear.turning_on import turning_on
 from ffr_dyn.scene.force_kinds import forces_of
@@ -58,6 +59,7 @@ ALL_TURN = (
     "would vary more; give them omega_bar to say it"
 )
 PHASES = 8  # of a turn, over which a mean is taken
+TURNS = 16  # of the fastest body, at most, over which it is taken where others have turned by whole turns as well
 SAME = 1e-6  # of a state that is in its steady motion: of velocities and forces, relative
 TURNED = 1.0  # rad: how far on the scene is looked at again
 STEP = 1e-4  # m, rad: of differences, extrapolated
@@ -84,6 +86,29 @@ class Screws:
         speeds = np.linalg.norm(self.w, axis=1)
         same = np.isclose(speeds, self.fastest, rtol=SAME, atol=0.0) | (speeds <= SAME * self.fastest)
         return self.fastest if same.all() else 0.0
+
+    def in_whole_turns(self) -> tuple[Screws, int]:
+        """The screws at speeds so near to these that all bodies have turned by whole turns when the fastest has done so many:
+        these themselves where they do. Bodies that turn at several speeds go on doing so."""
+        speeds = np.linalg.norm(self.w, axis=1)
+        shares = np.where(speeds > SAME * self.fastest, speeds / (self.fastest or 1.0), 0.0)
+        offers = [_whole(count * shares) / count for count in range(1, TURNS + 1)]
+        off = [float(np.abs(one - shares).max()) if (one[shares > 0] > 0).all() else np.inf for one in offers]
+        best = next((k for k, one in enumerate(off) if one <= SAME), int(np.argmin(off)))
+        if off[best] <= SAME or off[best] == np.inf:
+            return self, best + 1
+        paces = np.divide(offers[best], shares, out=np.ones(len(shares)), where=shares > 0)[:, None]
+        return Screws(paces * self.u, paces * self.w), best + 1
+
+
+def _whole(turns: Array) -> Array:
+    """(B,) the nearest whole turns, at least one, fewer of what is slower; zero where none are left, and of what rests."""
+    left, found, below = turns.copy(), np.zeros(len(turns)), np.inf
+    while left.max() > 0:
+        alike = left >= (1 - SAME) * left.max()
+        below = max(0.0, min(max(1.0, np.rint(left.max())), below - 1))
+        found[alike], left[alike] = below, 0.0
+    return found
 
 
 def screws_of(place: Layout, x: Array, v: Array) -> Screws:
@@ -181,7 +206,8 @@ def _over_turn(machine: Machine, x: Array) -> list[_Loads]:
     system, place = machine.system, machine.place
     now = At(system.scene, place, machine.time, x, velocities(place, machine.screws, x))
     seeing = [force for force in forces_of(system.scene) if _sees_velocities(now, force)]
-    return [_loads(machine, time, carried(place, machine.screws, x, time), seeing) for time in machine.phases]
+    paced, _ = machine.screws.in_whole_turns()
+    return [_loads(machine, time, carried(place, paced, x, time), seeing) for time in machine.phases]
 
 
 def _loads(machine: Machine, later: float, x: Array, seeing: Sequence[Force]) -> _Loads:
@@ -241,8 +267,13 @@ def _add_by_differences(total: Sums, D: Array, screws: Screws, now: At, force: F
     def rated(of: Array) -> Array:
         return _derivative(lambda rate: given(replace(now, v=of + to_global_axes(place, now.x, rate))), 1.0, still.size)
 
-    total.forces[:] += added(still)
+    here = added(still)
+    total.forces[:] += here
     total.tangent[:] += _derivative(added, STEP, still.size)
+    for b in range(len(place.n)):  # they are in the axes of bodies that are moved, the tangent is in those at x
+        shift, turn = place.R_dot(b), place.omega(b)
+        total.tangent[shift, turn] -= skew(here[shift])
+        total.tangent[turn, turn] -= 0.5 * skew(here[turn])
     D += rated(still) - rated(now.v)
 
 
@@ -356,9 +387,9 @@ def _at(machine: Machine, x: Array) -> Steady:
 
 
 def _phases(machine: Machine) -> tuple[float, ...]:
-    """[s] in a turn of the fastest body."""
-    fastest = machine.screws.fastest
-    return tuple(2 * np.pi / fastest * k / PHASES for k in range(PHASES)) if fastest else (0.0,)
+    """[s] in which all bodies have turned by whole turns; the fastest by one, where there is but one speed."""
+    fastest, (_, turns) = machine.screws.fastest, machine.screws.in_whole_turns()
+    return tuple(2 * np.pi / fastest * k / PHASES for k in range(PHASES * turns)) if fastest else (0.0,)
 
 
 def _varies(varying: float, rate: float) -> str:

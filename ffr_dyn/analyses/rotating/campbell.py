@@ -287,7 +287,7 @@ def _as_result(
     ratios = np.array([damping_ratios(one.values, one.seen, one.whirl) for one in spectra])
     worst = max((one.prestrained for one in spectra), key=lambda one: one.share)
     unstable = [note for note in [growing(spectra[0].found)] if note]
-    notes = [*distinct(note for one in spectra for note in one.found.notes), *unstable, *told(worst, names[worst.mode])]
+    notes = [*distinct(note for one in spectra for note in one.notes), *unstable, *told(worst, names[worst.mode])]
     quantities = {
         "speed": Quantity(np.array(speeds), "rad/s", (), "of what turns"),
         "frequencies": Quantity(np.abs(values.imag) / (2 * np.pi), "Hz", (modes,), "in the turning axes"),

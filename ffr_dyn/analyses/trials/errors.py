@@ -9,6 +9,7 @@ from typing import Any
 
 from ffr_dyn.analyses.events import doubts, with_errors
 from ffr_dyn.analyses.integration import LOOKS, evaluation_cost
+from ffr_dyn.analyses.trials.faded import without_faded
 from ffr_dyn.analyses.trials.runs import Runs, has_failed
 from ffr_dyn.consistency.assemble import Assembled
 from ffr_dyn.consistency.step_error import (
@@ -106,6 +107,7 @@ def with_its_errors(runs: Runs, trial: Trial, other: Any, *longer: Any) -> Trial
     )
     start = _start(runs, trial.method, trial.result, trial.twins[0]) if trial.twins else ()
     errors = with_start(errors, trial.result, *start) if start else errors
+    errors = without_faded(errors, trial.result, other, runs)
     return replace(trial, twins=twins, errors=errors, **_moments(trial.result, errors, other, order, twins))
 
 

@@ -16,8 +16,10 @@ from ffr_dyn.analyses.trials.runs import Runs, has_failed
 from ffr_dyn.consistency.step_error import (
     A_FORMULA,
     PLACES,
+    SLIGHT,
     StepError,
     from_rounding,
+    natural_units,
     of_the_range,
     percent,
     too_coarse,
@@ -45,7 +47,7 @@ def finished(runs: Runs, trial: Trial, path: str | Path | None, ringing: Set[str
         *unseen,
         *(_untold(runs) if trial.errors else ()),
         *_unresolved(runs, trial, ringing),
-        *_coarse(result),
+        *_coarse(trial),
         *_unstable(result, grown),
         *(_left(runs, trial) if trial.errors and not grown else ()),
         *trial.doubts,
@@ -109,19 +111,30 @@ def _unresolved(runs: Runs, trial: Trial, ringing: Set[str]) -> list[str]:
     words = f" of {found / 2 / np.pi:.4g} Hz" if found else ""
     step = (1.2 if of.ratio[-1] > 0 else 0.25) / of.omega[-1]
     times = (4 / step) / ((4 if method.order > 2 else 2) / method.step)
+    others = f"{_others(len(told) - 1)}{_slightly(trial, told)}"
     return [
         f"vibration{words} that a step of {method.step:.3g} s does not resolve carries "
-        f"{of_the_range(told[name].of_range)} of {name}{_others(len(told) - 1)}; rk4 with a step of {step:.2g} s resolves "
+        f"{of_the_range(told[name].of_range)} of {name}{others}; rk4 with a step of {step:.2g} s resolves "
         f"it, for about {max(times, 1):.2g} times the time of this run{_without_shock(runs.begin)}"
     ]
+
+
+def _slightly(trial: Trial, told: Mapping[str, StepError]) -> str:
+    """How far points are off, where that is little beside the scene."""
+    lengths = [name for name in told if trial.result.quantities[name].unit == "m"]
+    off = max((told[name].error for name in lengths), default=np.inf)
+    return (
+        f", by which no point is off more than {off:.2g} m" if off <= SLIGHT * natural_units(trial.result)("m") else ""
+    )
 
 
 def _without_shock(begin: Beginning) -> str:
     return '; if it is the start that excites it, begin = "quasi-static" leaves it out' if begin == "as-given" else ""
 
 
-def _coarse(result: Result) -> list[str]:
-    found = too_coarse(result)
+def _coarse(trial: Trial) -> list[str]:
+    result, faded = trial.result, {name for name, error in trial.errors.items() if error.faded}
+    found = {name: share for name, share in too_coarse(result).items() if name not in faded}
     if not found:
         return []
     name = max(found, key=lambda one: found[one])

@@ -4,15 +4,21 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from ffr_dyn.analyses.trials.errors import Trial, beside_twin, further_runs, leap_of, with_its_errors
+from ffr_dyn.analyses.trials.faded import without_faded
 from ffr_dyn.analyses.trials.notes import finished
 from ffr_dyn.analyses.trials.runs import Runs
 from ffr_dyn.consistency.step_error import (
     PLACES,
+    SLIGHT,
+    Beside,
+    natural_units,
+    range_of,
 )
 from ffr_dyn.integrators import Within, stepped
 from ffr_dyn.results.result import Result
@@ -24,6 +30,7 @@ SLOW = 0.7  # a ringing output's error falls slower than the step to this power,
 IN_COMPANY = 1.4  # or to this one, if it is of vibration, where others ring
 
 # What a step is to keep within the accuracy always, and what where it does not ring.
+DEFLECTIONS = re.compile(r"\.displacement$")
 DRIVING = re.compile(r"\.(displacement|rotation|force|moment|effort|torque|tension)$|^measured\.")
 
 
@@ -34,6 +41,7 @@ def searched(runs: Runs, within: Within, kept: dict[str, Any], count: int) -> Re
         method = stepped(within, runs.output_step / count)
         try:
             trial, _ = beside_twin(runs, method, count, kept)
+            trial = _beside_last(runs, trial, trials)
         except (ComputationError, InputError):
             if count >= FINEST:
                 raise
@@ -48,6 +56,14 @@ def searched(runs: Runs, within: Within, kept: dict[str, Any], count: int) -> Re
         if excess <= 1.0 or count >= FINEST:
             return finished(runs, trial, path, ringing)
         count, kept = _next(count, excess, leap_of(method)), {**kept, "path": path, "resume": None}
+
+
+def _beside_last(runs: Runs, trial: Trial, earlier: Sequence[Trial]) -> Trial:
+    """The trial, which a twin alone has told, beside the one with longer steps before it."""
+    if not trial.errors or not earlier:
+        return trial
+    last = Beside(earlier[-1].result, trial.count / earlier[-1].count)
+    return replace(trial, errors=without_faded(trial.errors, trial.result, last, runs))
 
 
 def _next(count: int, excess: float, leap: int) -> int:
@@ -69,4 +85,12 @@ def _excess(trial: Trial, ringing: set[str], earlier: Sequence[Trial]) -> float:
             vibrating = (name for name in driving if trial.errors[name].vibrates)
             ringing |= {name for name in vibrating if left[name] > (trial.count / before.count) ** -IN_COMPANY}
     wanted = (name for name in trial.errors if PLACES.search(name) or DRIVING.search(name))
-    return max((trial.errors[name].of_range for name in wanted if name not in ringing), default=0.0)
+    left_out = ringing | (_slight(trial) if any(DEFLECTIONS.search(name) for name in ringing) else set())
+    return max((trial.errors[name].of_range for name in wanted if name not in left_out), default=0.0)
+
+
+def _slight(trial: Trial) -> set[str]:
+    """The positions that move by no more than deflections do, and ring as these."""
+    result, size = trial.result, natural_units(trial.result)("m")
+    points = (name for name in trial.errors if PLACES.search(name) and result.quantities[name].unit == "m")
+    return {name for name in points if range_of(result[name]) <= SLIGHT * size}

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 import ffr_dyn as fd
 from ffr_dyn.linear.hill import Varying, hill
+from ffr_dyn.linear.matrices import CUT
 
 MASS, ACROSS, ALONG, ENDS = 10.0, 0.5, 0.9, (-0.2, 0.3)  # kg, kg m^2, m
 STIFF, AXIAL = (1e6, 1.5e6), 1e6  # N/m
@@ -88,6 +90,36 @@ def test_where_hills_determinant_is_unstable_mathieus_equation_is():
     assert found.values.size == 2
     assert found.values.real.max() == pytest.approx(b, rel=1e-4)
     assert np.abs(found.values.imag) == pytest.approx([0.5, 0.5])
+
+
+@pytest.mark.parametrize("slow", [0.3, 0.05, 0.02])
+def test_what_changes_slowly_takes_many_harmonics(slow):
+    """y'' + (1 + 0.4 cos(w t)) y = 0, by its map over a turn."""
+
+    def rates(t, y):
+        return [y[1], -(1 + 0.4 * np.cos(slow * t)) * y[0]]
+
+    turn = 2 * np.pi / slow
+    ends = [solve_ivp(rates, (0, turn), y, method="DOP853", rtol=1e-9, atol=1e-11).y[:, -1] for y in np.eye(2)]
+    exponents = np.log(np.linalg.eigvals(np.array(ends)).astype(complex)) / turn
+    found = hill(Varying(np.array([[[1.0]], [[0.2]]], complex), np.zeros((2, 1, 1), complex), slow))
+    apart = (found.values[:, None] - exponents) / (1j * slow)
+    assert np.abs(slow * (apart - np.round(apart.real))).min(axis=1).max() < 1e-6
+    assert found.left < 1e-6
+
+
+def test_modes_that_take_more_harmonics_than_there_is_room_for_are_told(monkeypatch):
+    monkeypatch.setattr("ffr_dyn.linear.hill.HARMONICS", (1, 2, 3))
+    for speed, told in ((20.0, 1), (300.0, 0)):
+        notes = fd.linearise(rotor(speed, across=(0.4, 0.6))).notes
+        assert sum(CUT.partition(":")[0] in note for note in notes) == told
+
+
+@pytest.mark.slow
+def test_a_campbell_diagram_tells_them_once(monkeypatch):
+    monkeypatch.setattr("ffr_dyn.linear.hill.HARMONICS", (1, 2, 3))
+    found = fd.campbell(rotor(20.0, across=(0.3, 0.7)), speeds=(20.0, 25.0))
+    assert sum(CUT.partition(":")[0] in note for note in found.attributes["notes"]) == 1
 
 
 def test_the_damping_of_a_whirl_is_that_at_the_frequency_seen_from_the_ground():

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from test_analyses_kinematic import bar, slider_crank
+from test_dyn_plane import rod
 from test_quasi_static import rotor
 
 import ffr_dyn as fd
@@ -17,7 +18,7 @@ from ffr_dyn.equations.layout import to_body_axes
 from ffr_dyn.linear.eigen import eigen
 from ffr_dyn.linear.matrices import reduced
 from ffr_dyn.linear.matrices import state_matrix as steady_matrix
-from ffr_dyn.linear.steady_state import carried, screws_of, steady_here, steady_state
+from ffr_dyn.linear.steady_state import Screws, carried, screws_of, steady_here, steady_state
 
 
 def governor(speed: float, length: float = 1.0) -> fd.Scene:
@@ -79,6 +80,26 @@ def test_the_exact_state_matrix_is_that_of_differences():
     assert np.abs(A - exact).max() < 1e-5 * np.abs(exact).max()
 
 
+def drag(name: str, marker: str) -> fd.Load:
+    """A Python force and moment against the velocity of a point."""
+
+    def against(t, state):
+        velocity = np.asarray(state.velocity(marker))
+        return np.concatenate([-3.0 * velocity, -0.2 * velocity])
+
+    return fd.Load(name, marker, function=against)
+
+
+def test_python_forces_against_a_velocity_have_the_exact_state_matrix_too():
+    """Of a rod that a motor turns through what drags at its end, and so in a steady motion under a large force."""
+    assembled = assemble(in_space(rotor(50.0, stiffening=True, loads=(drag("air", "rod.b"),))))
+    found = steady_state(assembled, 0.0)
+    near = chart(evaluator(assembled.system), 0.0, found.x, found.v)
+    A, _ = state_matrix(near)
+    exact = replace(found, Z=near.Z)
+    np.testing.assert_allclose(steady_matrix(exact, reduced(exact)), A, atol=1e-8 * np.abs(A).max())
+
+
 def test_dampers_to_the_ground_push_what_turns():
     """A whirling mass of internal and external damping c_i, c_e: K of the turning axes has the skew part c_e Omega."""
     c, speed = 4.0, 30.0
@@ -113,6 +134,38 @@ def test_weight_across_the_axis_is_taken_as_its_mean():
     heavy = fd.steady(replace(scene, gravity=(0, -9.81, 0)))
     assert "mean over a turn" in heavy.attributes["notes"][-1]
     np.testing.assert_allclose(heavy["rod.q"], plain, atol=1e-9 * np.abs(plain).max())
+
+
+SLOWLY = [pytest.param(share, marks=pytest.mark.slow) for share in (0.5, 0.3, np.sqrt(0.1), 1e-3)]
+
+
+@pytest.mark.parametrize("slower", [-0.5, *SLOWLY])
+def test_weight_across_rotors_of_several_speeds_bends_none_of_them(slower):
+    """Its mean in the axes of each is zero, whatever the other does."""
+    rods = [rod(name, 0.8, stiffening=True) for name in "ab"]
+    speeds, places = (200.0, 200.0 * slower), {"O": (0, 0, 0), "P": (0, 0, 1.0)}
+    scene = fd.Scene(
+        tuple(fd.Body(one.name, one, position=at) for one, at in zip(rods, places.values(), strict=True)),
+        tuple(fd.Joint(f"hinge_{n}", "revolute", f"ground.{at}", f"{n}.a") for n, at in zip("ab", places, strict=True)),
+        tuple(fd.Driver(f"motor_{n}", f"hinge_{n}", fd.polynomial(0, w)) for n, w in zip("ab", speeds, strict=True)),
+        ground=places,
+    )
+    plain, heavy = fd.steady(scene), fd.steady(replace(scene, gravity=(0, -9.81, 0)))
+    for name in ("a.q", "b.q"):
+        np.testing.assert_allclose(heavy[name], plain[name], atol=1e-9 * np.abs(plain["a.q"]).max())
+
+
+def test_bodies_at_several_speeds_come_round_together():
+    """The speeds themselves where they do within sixteen turns, else others, as many and in the same order."""
+    for speeds, turns in (([9, 9], 1), ([9, -9, 0], 1), ([9, 4.5], 2), ([10, 3], 10), ([9, 8.9, 5, 1e-3, 0], 16)):
+        w = np.outer(speeds, [0, 0, 1.0])
+        paced, count = Screws(np.zeros_like(w), w).in_whole_turns()
+        whole = paced.w[:, 2] / speeds[0] * count
+        np.testing.assert_allclose(whole, np.round(whole), atol=1e-12)
+        assert len(set(np.abs(np.round(whole)))) == len(set(np.abs(speeds)))
+        assert (np.diff(np.abs(whole)) <= 0).all()
+        assert count == turns
+        assert turns == 16 or paced.w is w
 
 
 def test_a_crank_drive_has_no_steady_motion():
