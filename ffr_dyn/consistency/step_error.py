@@ -348,7 +348,7 @@ def largest_difference(one: Array, other: Array) -> float:
 
 
 def ranges(run: Result) -> dict[str, float]:
-    """Of every output but the violations of constraints: the largest range of a component, but no less than `least_ranges`."""
+    """Of every output but the violations of constraints: the largest range of a component, no less than `least_ranges`."""
     least = least_ranges(run)
     return {name: max(span, least[name]) for name, span in _spans_and_sizes(run)[0].items()}
 
