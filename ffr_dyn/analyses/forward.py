@@ -24,9 +24,8 @@ from ffr_dyn.compile.divided_steps import Fast, fast_of
 from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.consistency.assemble import Assembled, assemble
 from ffr_dyn.functions.stopwatch import Stopwatch
-from ffr_dyn.integrators import Integrator, Within, stepped
+from ffr_dyn.integrators import Integrator, Within
 from ffr_dyn.integrators.stabilisation import Projection, Stabilisation
-from ffr_dyn.results.file import load_result
 from ffr_dyn.results.result import Result
 from ffr_dyn.scene.checks import several
 from ffr_dyn.scene.scene import Scene
@@ -126,9 +125,9 @@ def forward(
         common["stabilisation"] = _tight(stabilisation, getattr(wanted, "accuracy", Within().accuracy))
     common["fast"] = _fast(assembled.system, wanted, start, end, output_step)
     runs, kept = Runs(scene, assembled, start, output_step, common, begin), {"path": path, "resume": resume}
-    method, count = _resumed(resume, wanted, output_step)
-    if isinstance(method, Within):
-        return searched(runs, method, kept, count)
+    if isinstance(wanted, Within):
+        return searched(runs, wanted, kept)
+    method = wanted
     count = 0 if method.controlled else round(output_step / method.step)
     told = checked(runs, method, count, kept) if check else Trial(method, count, runs.run(method, **kept))
     if check is None and cost_of_errors(assembled, told.result) < QUICK:
@@ -148,15 +147,3 @@ def _tight(stabilisation: Stabilisation, accuracy: float) -> Stabilisation:
     if not isinstance(stabilisation, Projection):
         return stabilisation
     return Projection(min(stabilisation.tolerance, PROJECTED * accuracy))
-
-
-def _resumed(
-    resume: str | Path | None, method: Integrator | Within, output_step: float
-) -> tuple[Integrator | Within, int]:
-    """The method of a run that goes on, and how many steps to a row the first trial has where one is still looked for: a
-    finished run has found its step, one that was stopped was a trial."""
-    if isinstance(method, Within) and resume is not None and Path(resume).exists():
-        attributes = load_result(resume).attributes
-        if step := attributes.get("step"):
-            return (stepped(method, step) if "errors" in attributes else method), round(output_step / step)
-    return method, FIRST

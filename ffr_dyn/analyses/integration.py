@@ -130,7 +130,7 @@ def integrate(
     header = _header(scene, assembled, method, stabilisation, (start, end, output_step))
     kept = _kept(assembled.system, wanted, rows) if path is None and not events else Measured(assembled.system, wanted)
     run = _begun(assembled, method, stabilisation, start, spacing, kept, resume, mark, fast)
-    _check_resumed(run, substeps * rows, output_step / substeps)
+    _check_resumed(run.done, substeps * rows, output_step / substeps)
     watcher = _watcher(assembled, run, method, stabilisation, spacing, events, resume) if events else None
     with nullcontext() if path is None else _writer(path, scene, run, header, mark) as writer:
         for times, part in _advance(assembled, run, method, start, substeps, rows, wanted, stopwatch, watcher):
@@ -398,9 +398,7 @@ def _watcher(
 ) -> Watcher:
     """The search for events from where the run stands."""
     if resume is not None:
-        raise InputError(
-            "a run with events cannot be resumed: those of its first part are not in the file; run the whole"
-        )
+        _check_no_events(events)
     watcher = Watcher(assembled, method, gains(stabilisation), spacing, events)
     watcher.begin(run.engine, float(run.kept.times[0][0]))
     return watcher
@@ -472,17 +470,51 @@ def _changing(engine: Engine) -> Iterator[tuple[str, Array]]:
         yield from leaves(getattr(engine.tables, name), name)
 
 
-def _resumed(path: Path, mark: str, engine: Engine, energy: EnergyWatch, seen: Seen, kept: Kept) -> _Run:
-    """The run that a result file holds, ready to go on in the engine."""
+def check_continues(
+    path: str | Path,
+    assembled: Assembled,
+    method: Integrator,
+    *,
+    start: float,
+    end: float,
+    output_step: float,
+    stabilisation: Stabilisation,
+    outputs: Sequence[str],
+    events: Sequence[Event],
+    **others: Any,
+) -> None:
+    """Raises InputError where the run that a result file holds does not go on with these settings; what `others` there are
+    does not matter."""
+    _check_no_events(events)
+    wanted = selected(assembled.system, outputs)
+    saved = _saved(Path(path), _fingerprint(assembled, method, stabilisation, start, output_step, wanted))
+    _check_resumed(saved.steps, round((end - start) / method.step), method.step)
+
+
+def _check_no_events(events: Sequence[Event]) -> None:
+    if events:
+        raise InputError(
+            "a run with events cannot be resumed: those of its first part are not in the file; run the whole"
+        )
+
+
+def _saved(path: Path, mark: str) -> Checkpoint:
+    """The checkpoint of a result file, which has to be of the run with this mark."""
     content = load_checkpoint(path)
     if content is None:
         raise InputError(f"{path} has no checkpoint: it is not the result of a forward run; run from the start")
-    saved, earlier = decode(content), load_result(path)
+    saved = decode(content)
     if saved.fingerprint != mark:
         raise InputError(
             f"{path} is the result of another scene or of other settings (step, method, start, output step, outputs): its "
             "run cannot be continued with these; run from the start, to another file if that one is still wanted"
         )
+    return saved
+
+
+def _resumed(path: Path, mark: str, engine: Engine, energy: EnergyWatch, seen: Seen, kept: Kept) -> _Run:
+    """The run that a result file holds, ready to go on in the engine."""
+    saved, earlier = _saved(path, mark), load_result(path)
     changing = _arrays(engine, energy, seen)
     if any(name not in saved.arrays or saved.arrays[name].shape != array.shape for name, array in changing.items()):
         raise InputError(
@@ -498,9 +530,9 @@ def _resumed(path: Path, mark: str, engine: Engine, energy: EnergyWatch, seen: S
     return _Run(engine, energy, kept, seen, saved.steps)
 
 
-def _check_resumed(run: _Run, steps: int, step: float) -> None:
-    if run.done > steps:
-        raise InputError(f"the run to be continued has gone {(run.done - steps) * step:g} s beyond this end already")
+def _check_resumed(done: int, steps: int, step: float) -> None:
+    if done > steps:
+        raise InputError(f"the run to be continued has gone {(done - steps) * step:g} s beyond this end already")
 
 
 # ---- the result -----------------------------------------------------------------------------------------------------

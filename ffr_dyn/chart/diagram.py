@@ -6,6 +6,7 @@ import statistics
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
+from ffr_dyn.chart.meaning import check_meaning
 from ffr_dyn.chart.measures import Measure, default_measures, measure_of
 from ffr_dyn.chart.pareto import pareto_front
 from ffr_dyn.chart.reference import WANTED, Reference, distance, reference
@@ -14,7 +15,7 @@ from ffr_dyn.chart.variants import FULL, Model, Variant, grid
 from ffr_dyn.consistency.assemble import assemble
 from ffr_dyn.integrators import methods as known_methods
 from ffr_dyn.integrators.stabilisation import Projection, Stabilisation
-from ffr_dyn.results.quantities import catalogue
+from ffr_dyn.results.quantities import Entry, catalogue
 from ffr_dyn.scene.scene import Scene
 from ffr_prep.common.brief import Brief
 from ffr_prep.common.errors import InputError
@@ -102,9 +103,9 @@ class Diagram(Brief):
         return replace(self, points=(*self.points, *points), lost=(*self.lost, *lost))
 
 
-def quantities_of(scene: Scene, start: float = 0.0) -> dict[str, str]:
-    """The unit of every quantity that a run of the scene has, by name."""
-    return {name: entry.unit for name, entry in catalogue(assemble(scene, time=start).system).items()}
+def quantities_of(scene: Scene, start: float = 0.0) -> Mapping[str, Entry]:
+    """Every quantity that a run of the scene has, by name."""
+    return catalogue(assemble(scene, time=start).system)
 
 
 def measures_of(scene: Scene, texts: Sequence[str], start: float = 0.0) -> tuple[Measure, ...]:
@@ -148,6 +149,7 @@ def work_precision(
     >>> with fd.pool() as workers: diagram = fd.work_precision(scene, fd.Span(0.5, 1e-3), workers)
     """
     measures = measures or measures_of(scene, (), span.start)
+    check_meaning(scene, measures, models)
     variants = grid(scene, models, dict.fromkeys(known_methods()) if methods is None else methods, span.output_step)
     found = reference(scene, span, measures, stabilisation, pool, limit=limit, wanted=wanted, tell=tell)
     jobs = [Job(scene, variant, span, measures, stabilisation, repeats, limit) for variant in variants]

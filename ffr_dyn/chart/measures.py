@@ -7,12 +7,14 @@ As text (`measure_of`): "position:rod.tip", "deflection:rod" (everywhere), "defl
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 
+from ffr_dyn.results.quantities import Entry
 from ffr_dyn.results.result import Result
 from ffr_dyn.results.stress import stress_histories
 from ffr_dyn.scene.parts import owner
@@ -53,21 +55,24 @@ class Measure(Protocol):
 
 @dataclass(frozen=True)
 class Quantity:
-    """Any quantity of a result; the scale of a position is the extent of its motion, of others the largest value."""
+    """Any quantity of a result, or its component `part`; the scale of a position is the extent of its motion, of others the
+    largest value. A quantity of deformation that a rigid body does not have is zero."""
 
     name: str
     of: str
     unit: str
     words: str
     moves: bool = False
+    part: str = ""
 
     @property
     def outputs(self) -> tuple[str, ...]:
         return (self.of,)
 
     def values(self, result: Result) -> Array:
-        found = result[self.of] if self.of in result.quantities else result[self.name]
-        return found.reshape(result.time.size, -1)
+        if self.of not in result.quantities:
+            return np.zeros((result.time.size, 1))
+        return result[f"{self.of}.{self.part}" if self.part else self.of].reshape(result.time.size, -1)
 
     def scale(self, result: Result) -> float:
         values = self.values(result)
@@ -131,7 +136,7 @@ class Shape:
 
     @property
     def outputs(self) -> tuple[str, ...]:
-        return (f"{self.body}.q",)
+        return f"{self.body}.q", f"{self.body}.*.displacement"
 
     def values(self, result: Result) -> Array:
         if f"{self.body}.q" not in result.quantities:
@@ -211,10 +216,10 @@ def _largest(values: Array) -> float:
 # ---- from text ----------------------------------------------------------------------------------------------------
 
 
-def measure_of(text: str, scene: Scene, quantities: Any) -> Measure:
+def measure_of(text: str, scene: Scene, quantities: Mapping[str, Entry]) -> Measure:
     """The measure that a text means in a scene.
 
-    quantities : unit of every quantity that the scene has, by name
+    quantities : every quantity that the scene has, by name
 
     Raises InputError that names what there is.
     """
@@ -226,7 +231,7 @@ def measure_of(text: str, scene: Scene, quantities: Any) -> Measure:
     return _KINDS[kind](text, what, scene, quantities)
 
 
-def default_measures(scene: Scene, quantities: Any) -> tuple[Measure, ...]:
+def default_measures(scene: Scene, quantities: Mapping[str, Entry]) -> tuple[Measure, ...]:
     """Of the largest flexible body: the position of its last interface and its deflection; else of the last body."""
     body = max(scene.bodies, key=lambda b: b.model.n)
     body = body if body.model.n else scene.bodies[-1]
@@ -238,27 +243,32 @@ def default_measures(scene: Scene, quantities: Any) -> tuple[Measure, ...]:
     return tuple(measure_of(text, scene, quantities) for text in texts)
 
 
-def _plain(text: str, quantities: Any) -> Measure:
+def _plain(text: str, quantities: Mapping[str, Entry]) -> Measure:
     if text == "energy":
         return Energy()
     if text == "constraint":
         return Violation()
-    owner = text
-    while owner not in quantities and "." in owner:
-        owner = owner.rpartition(".")[0]
-    if owner not in quantities:
-        close = get_close_matches(text, list(quantities), 3, 0.4)
+    head, _, label = text.rpartition(".")
+    owner, part = (text, "") if text in quantities else (head, label)
+    if owner not in quantities or part not in ("", *_labels(quantities[owner])):
+        parts = (f"{name}.{label}" for name, entry in quantities.items() for label in _labels(entry))
+        close = get_close_matches(text, [*quantities, *parts], 3, 0.4)
         hint = f"did you mean {', '.join(close)}?" if close else f"there are: {', '.join(quantities)}"
         raise InputError(f"measure {text!r} is no quantity of the scene and no kind of measure; {hint}")
-    return Quantity(text, owner, quantities[owner], text, moves=owner.endswith((".position", ".R")))
+    return Quantity(text, owner, quantities[owner].unit, text, owner.endswith((".position", ".R")), part)
 
 
-def _position(text: str, what: str, scene: Scene, quantities: Any) -> Measure:
+def _labels(entry: Entry) -> tuple[str, ...]:
+    """Of the components of a quantity."""
+    return entry.axes[0].labels if entry.axes else ()
+
+
+def _position(text: str, what: str, scene: Scene, quantities: Mapping[str, Entry]) -> Measure:
     _marker(text, what, scene)
     return Quantity(text, f"{what}.position", "m", f"position of {what}", moves=True)
 
 
-def _reaction(text: str, what: str, scene: Scene, quantities: Any) -> Measure:
+def _reaction(text: str, what: str, scene: Scene, quantities: Mapping[str, Entry]) -> Measure:
     kind = {"reaction": "force", "moment": "moment"}[text.partition(":")[0]]
     if f"{what}.{kind}" not in quantities:
         known = [name.rpartition(".")[0] for name in quantities if name.endswith(".force") and name.count(".") == 1]
@@ -266,7 +276,7 @@ def _reaction(text: str, what: str, scene: Scene, quantities: Any) -> Measure:
     return Quantity(text, f"{what}.{kind}", "N" if kind == "force" else "N m", f"{kind} of {what}")
 
 
-def _deflection(text: str, what: str, scene: Scene, quantities: Any) -> Measure:
+def _deflection(text: str, what: str, scene: Scene, quantities: Mapping[str, Entry]) -> Measure:
     place, _, ends = what.partition("/")
     name, dot, _ = place.partition(".")
     body = _flexible(text, name, scene)
@@ -295,7 +305,7 @@ def _shape(text: str, body: Body) -> Measure:
     return Shape(text, body.name, tuple((float(x), float(y), float(z)) for x, y, z in some))
 
 
-def _stress(text: str, what: str, scene: Scene, quantities: Any) -> Measure:
+def _stress(text: str, what: str, scene: Scene, quantities: Mapping[str, Entry]) -> Measure:
     name, _, place = what.partition("@")
     surface = _flexible(text, name, scene).model.surface
     if surface is None or surface.stress is None:

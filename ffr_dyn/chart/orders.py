@@ -15,24 +15,26 @@ ABOVE = 3.0  # times the floor, itself a careful estimate: errors below are not 
 def observed_order(steps: Sequence[float], errors: Sequence[float], floor: float = 0.0) -> float:
     """Slope of log(error) over log(step) between the two finest steps whose errors are well above the floor.
 
-    Not a number where there are not two, or where errors do not fall: an order has no meaning there.
+    Zero where errors do not fall, not a number where there are not two such steps: an order has no meaning there.
     """
-    known = sorted((h, e) for h, e in zip(steps, errors, strict=True) if e > ABOVE * floor and e > 0)
+    known = sorted({h: e for h, e in zip(steps, errors, strict=True) if e > ABOVE * floor and e > 0}.items())
     if len(known) < 2:
         return float("nan")
     (h, e), (h2, e2) = known[:2]
     order = float(np.log(e2 / e) / np.log(h2 / h))
-    return order if order >= LEVEL else float("nan")
+    return order if order >= LEVEL else 0.0
 
 
 def order_words(order: float) -> str:
     """For a reader."""
-    return f"{order:.1f}" if order == order else "level"
+    if np.isnan(order):
+        return "not to be seen"
+    return f"{order:.1f}" if order else "level"
 
 
 def orders(diagram: Diagram, measure: str) -> dict[tuple[str, str], float]:
     """The observed order [1] of every line (series, model) of a diagram whose methods take steps: the slope of the error over
-    the step.
+    the step. Zero where errors do not fall; not a number where fewer than two steps have errors above the reference's.
 
     >>> fd.orders(diagram, "deflection:rod")
     """

@@ -17,7 +17,7 @@ import fnmatch
 import re
 import statistics
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
@@ -31,10 +31,11 @@ from ffr_dyn.chart.measures import Measure
 from ffr_dyn.chart.variants import Variant
 from ffr_dyn.compile.first_use import ensure_compiled
 from ffr_dyn.consistency.assemble import Assembled, assemble
+from ffr_dyn.consistency.step_error import least_ranges
 from ffr_dyn.functions.stopwatch import Stopwatch
 from ffr_dyn.functions.together import alone, processors
 from ffr_dyn.integrators.stabilisation import Projection, Stabilisation
-from ffr_dyn.results.quantities import catalogue
+from ffr_dyn.results.quantities import catalogue, selected
 from ffr_dyn.results.result import Result
 from ffr_dyn.scene.scene import Scene
 from ffr_prep.body import BodyError
@@ -133,7 +134,7 @@ def perform(job: Job) -> Outcome | Failure:
         return Failure(f"{bad} is not finite")
     return Outcome(
         values,
-        {measure.name: measure.scale(result) for measure in job.measures},
+        _scales(job.measures, result),
         tuple(wall for wall, _ in times),
         tuple(cpu for _, cpu in times),
         int(result.attributes["evaluations"]),
@@ -148,10 +149,23 @@ def _wants_more(times: list[tuple[float, float]], repeats: int) -> bool:
 
 
 def _outputs(scene: Scene, job: Job) -> tuple[str, ...]:
-    """The quantities that the measures want and the variant has; a rigid body has fewer."""
-    has = catalogue(assemble(scene, time=job.span.start).system)
+    """The quantities that the measures want and the variant has, as a rigid body has fewer, and those that tell scales."""
+    system = assemble(scene, time=job.span.start).system
     wanted = dict.fromkeys(pattern for measure in job.measures for pattern in measure.outputs)
-    return tuple(name for name in has if any(fnmatch.fnmatchcase(name, pattern) for pattern in wanted))
+    return tuple(dict.fromkeys([*_matching(catalogue(system), wanted), *selected(system, ("default",))]))
+
+
+def _matching(names: Iterable[str], patterns: Iterable[str]) -> list[str]:
+    return [name for name in names if any(fnmatch.fnmatchcase(name, pattern) for pattern in patterns)]
+
+
+def _scales(measures: Sequence[Measure], result: Result) -> dict[str, float]:
+    """Of the errors of each measure: its own, but no less than what counts as the range of something that does not move."""
+    least, found = least_ranges(result), dict[str, float]()
+    for measure in measures:
+        of = [name for name in _matching(least, measure.outputs) if result.quantities[name].unit == measure.unit]
+        found[measure.name] = max([measure.scale(result), *(least[name] for name in of)])
+    return found
 
 
 _WARM: set[type] = set()

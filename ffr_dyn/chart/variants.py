@@ -115,14 +115,14 @@ def _model(modes: int | None, drop: tuple[str, ...], meshes: Sequence[tuple[str,
 def grid(
     scene: Scene, models: Iterable[Model], methods: Mapping[str, Sequence[float] | None], output_step: float
 ) -> tuple[Variant, ...]:
-    """All methods with all numbers on all models; numbers None stand for a ladder that `ladder` chooses."""
+    """All methods with all numbers on all models, each once; numbers None stand for a ladder that `ladder` chooses."""
     found: list[Variant] = []
     for model, (method, numbers) in product(models, methods.items()):
         make = maker(method)
         chosen = numbers
         if chosen is None:
             chosen = TOLERANCES if method in CONTROLLED else ladder(model.of(scene), make, output_step)
-        found += [Variant(method, float(number), model) for number in chosen]
+        found += [Variant(method, number, model) for number in dict.fromkeys(map(float, chosen))]
     return tuple(found)
 
 

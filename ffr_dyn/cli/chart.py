@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Container, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -137,10 +137,26 @@ def _methods(given: Sequence[str]) -> Mapping[str, Sequence[float] | None]:
     for text in given:
         name, _, numbers = text.partition("=")
         maker(name)
+        _check_once("--method", name, found)
         found[name] = _listed(numbers, float, f"--method {text}", "NAME=NUMBER,...") if numbers else None
         if any(not number > 0 for number in found[name] or ()):
             raise InputError(f"--method {text}: steps and tolerances must be positive")
     return found
+
+
+def _check_once(option: str, name: str, found: Container[str]) -> None:
+    if name in found:
+        raise InputError(
+            f"{option} {name} is given twice, and one would be lost; write all in one, as {option} {name}=ONE,OTHER"
+        )
+
+
+def _told_apart(files: Sequence[str]) -> dict[str, str]:
+    """The label of each file: its name, with the folder where others have the same name."""
+    stems = [Path(file).stem for file in dict.fromkeys(files)]
+    return {
+        file: stem if stems.count(stem) == 1 else file for file, stem in zip(dict.fromkeys(files), stems, strict=True)
+    }
 
 
 def _listed(text: str, of: Callable[[str], Any], what: str, form: str) -> list[Any]:
@@ -160,21 +176,26 @@ def _models(
     from ffr_dyn.chart.variants import models_of
     from ffr_prep.body import load_body
 
-    meshes: dict[str, list[Any]] = {}
+    own, files = {body.name: body.model for body in scene.bodies}, dict[str, list[str]]()
     for text in bodies:
-        name, _, files = text.partition("=")
-        own = {body.name: body.model for body in scene.bodies}
-        if name not in own or not files:
+        name, _, given = text.partition("=")
+        if name not in own or not given:
             raise InputError(f"--body {text}: write BODY=FILE,... with one of the bodies {', '.join(own)}")
-        others = [(f"{name} of {Path(file).stem}", load_body(file)) for file in files.split(",")]
-        meshes[name] = [(f"{name} of the scene", own[name]), *others]
+        _check_once("--body", name, files)
+        files[name] = given.split(",")
+    meshes = {
+        name: [
+            (f"{name} of the scene", own[name]),
+            *((f"{name} of {label}", load_body(file)) for file, label in _told_apart(given).items()),
+        ]
+        for name, given in files.items()
+    }
     return models_of(scene, numbers, [(), *drops], meshes)
 
 
 def _report(found: Diagram, against: str) -> list[str]:
     """The Pareto front of every measure, and what failed."""
-    from ffr_dyn.chart.orders import order_words, orders
-    from ffr_dyn.chart.variants import FULL
+    from ffr_dyn.chart.orders import orders
 
     lines = []
     for measure in found.measures:
@@ -188,12 +209,21 @@ def _report(found: Diagram, against: str) -> list[str]:
                 f"{point.evaluations:9d} evaluations" if against == "evaluations" else f"{point.cost(against):10.3e} s"
             )
             lines.append(f"  {cost}  error {error:8.1e} {measure.unit}{relative}  {point.label}")
-        shown = {method: order for (method, model), order in orders(found, measure.name).items() if model == FULL.label}
-        if shown:
-            listed = ", ".join(f"{method} {order_words(order)}" for method, order in shown.items())
-            lines.append(f"  order at the finest steps: {listed}")
+        lines += _order_lines(orders(found, measure.name))
     lines += [f"failed       {lost.label}: {lost.reason}" for lost in found.lost]
     return [*lines, ""]
+
+
+def _order_lines(found: Mapping[tuple[str, str], float]) -> list[str]:
+    """The orders of all methods, a line for every model."""
+    from ffr_dyn.chart.orders import order_words
+
+    models = dict.fromkeys(model for _, model in found)
+    words = {
+        of: ", ".join(f"{method} {order_words(found[method, of])}" for method, model in found if model == of)
+        for of in models
+    }
+    return [f"  order at the finest steps, {of}: {said}" for of, said in words.items()]
 
 
 def _write(found: Diagram, output: Path, against: str) -> list[Path]:

@@ -351,8 +351,14 @@ def largest_difference(one: Array, other: Array) -> float:
 
 
 def ranges(run: Result) -> dict[str, float]:
-    """Of every output but the violations of constraints: the largest range of a component, floored by those of its kind (the
-    last part of its name), where next to nothing moves, and by rounding."""
+    """Of every output but the violations of constraints: the largest range of a component, no less than `least_ranges`."""
+    least = least_ranges(run)
+    return {name: max(span, least[name]) for name, span in _spans_and_sizes(run)[0].items()}
+
+
+def least_ranges(run: Result) -> dict[str, float]:
+    """What counts as the range of an output where next to nothing moves: a share of the largest of its kind (the last part of
+    its name), and rounding."""
     spans, sizes = _spans_and_sizes(run)
     largest: dict[str, float] = {}
     for name, span in spans.items():
@@ -365,7 +371,7 @@ def ranges(run: Result) -> dict[str, float]:
     for kind, floor in _floors_at_rest(run, sizes).items():
         floors[kind] = max(floors.get(kind, 0.0), floor)
     rounding = _rounding(run, sizes)
-    return {name: max(span, floors[_kind(name)], rounding(run.quantities[name].unit)) for name, span in spans.items()}
+    return {name: max(floors[_kind(name)], rounding(run.quantities[name].unit)) for name in spans}
 
 
 def roundings(run: Result) -> dict[str, float]:

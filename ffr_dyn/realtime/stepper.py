@@ -19,6 +19,7 @@ import difflib
 import fnmatch
 from collections.abc import Callable, Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -89,7 +90,7 @@ class Stepper(Brief):
         readers = _readers(scene, outputs)
         assembled = assemble(replace(scene, forces=(*scene.forces, *readers)), time=start)
         self._system = assembled.system
-        self._start, self._step, self._steps = start, method.step, 0
+        self._start, self._step, self._steps, self._failed = start, method.step, 0, False
         self._loops = [_Loop(assembled.system, method, assembled.x.copy(), assembled.v.copy(), gains(stabilisation))]
         if assembled.all_rows is not None and _names_reactions(assembled, outputs):
             self._loops.append(_all_rows(assembled, method, self._loops[0]))
@@ -129,23 +130,28 @@ class Stepper(Brief):
         """Set inputs from now on: a number is held, (value, rate, second derivative) go on as a parabola.
 
         What drives a joint needs all three; a driver that is given a number stands still there, and the step in its
-        motion is taken back by projection. Raises InputError for names that are none and for values not finite.
+        motion is taken back by projection. Raises InputError for names that are none and for values that are no numbers or
+        not finite, and sets nothing then.
         """
         now = self.time
-        for name, value in values.items():
-            setting = self._set.get(name)
-            if setting is None:
+        for name in values:
+            if name not in self._set:
                 raise InputError(f"there is no input {name!r}; {_offer(name, self._set)}")
-            setting.put(now, value)
+        for name, parts in [(name, _parts(name, value)) for name, value in values.items()]:
+            self._set[name].put(now, *parts)
 
     def step(self, count: int = 1) -> None:
         """Go on by `count` steps.
 
-        Raises ComputationError as `forward` does; a state that was saved can be restored after it.
+        Raises ComputationError as `forward` does: it stands at a step that nobody knows then, and goes on from a state that
+        was saved and is restored. InputError where that was not done, and for another count than one or more whole steps.
         """
-        if count < 1:
-            raise InputError(f"a stepper goes on by one step or more, not by {count}; use save and restore to go back")
-        self._advance(count)
+        if not isinstance(count, Real) or not 1 <= count < np.inf or count % 1:
+            raise InputError(
+                f"a stepper goes on by one whole step or more, not by {count!r}; use save and restore to go back"
+            )
+        self._check_whole()
+        self._advance(int(count))
 
     def outputs(self) -> Mapping[str, Array]:
         """The outputs now, by name. They share memory with the stepper: the next step writes over them; copy to keep."""
@@ -162,7 +168,8 @@ class Stepper(Brief):
         return [*self._seen.assembled.notes, *ended("stepper", self._seen, steps)]
 
     def save(self) -> State:
-        """The state, with inputs."""
+        """The state, with inputs. Raises InputError after a step that failed."""
+        self._check_whole()
         return State(self._mark, self._steps, tuple(array.copy() for array in self._arrays))
 
     def restore(self, state: State) -> None:
@@ -176,12 +183,21 @@ class Stepper(Brief):
             )
         for array, saved in zip(self._arrays, state.arrays, strict=True):
             array[...] = saved
-        self._steps = state.steps
+        self._steps, self._failed = state.steps, False
+
+    def _check_whole(self) -> None:
+        """InputError where the state is that of a step that failed, somewhere on its way."""
+        if self._failed:
+            raise InputError(
+                "the last step of the stepper failed on its way: restore a state that was saved before it (state = "
+                "stepper.save(), stepper.restore(state)), or begin with a new stepper"
+            )
 
     def _advance(self, count: int) -> None:
         loop = self._loops[0]
         status = loop.run(self._start, self._steps, count)
         if status != OK:
+            self._failed = True
             settings = Settings(loop.method, float(loop.engine.tables.clock.gains[2]) > 0)
             reached = int(loop.engine.tables.clock.steps[NEXT])
             raise failure(loop.engine.system, loop.work, status, self._start + reached * self._step, settings)
@@ -241,19 +257,28 @@ class _Setting:
 
     def __init__(self, loops: Iterable[_Loop], name: str) -> None:
         tables = [(loop.system.model.functions.data, start) for loop in loops for start in loop.system.inputs[name]]
-        self._name = name
         self._numbers = [data[start + 2 : start + 7] for data, start in tables]
 
-    def put(self, now: float, value: Input) -> None:
-        value, rate, second = value if isinstance(value, tuple) else (value, 0.0, 0.0)
-        if not abs(value) + abs(rate) + abs(second) < np.inf:
-            raise InputError(f"input {self._name!r}: {(value, rate, second)} is not finite")
+    def put(self, now: float, value: float, rate: float, second: float) -> None:
         for numbers in self._numbers:
             numbers[0], numbers[2], numbers[3], numbers[4] = now, value, rate, 0.5 * second
 
     def value(self, now: float) -> float:
         since, _, value, rate, half = self._numbers[0].tolist()
         return float(value + (now - since) * (rate + (now - since) * half))
+
+
+def _parts(name: str, given: Input) -> tuple[float, float, float]:
+    """(value, rate, second derivative) of an input."""
+    try:
+        value, rate, second = map(float, given) if np.ndim(given) else (float(given), 0.0, 0.0)  # type: ignore[arg-type]
+    except (TypeError, ValueError):
+        raise InputError(
+            f"input {name!r} is {given!r}; give a number, or three: (value, rate, second derivative)"
+        ) from None
+    if not abs(value) + abs(rate) + abs(second) < np.inf:
+        raise InputError(f"input {name!r}: {(value, rate, second)} is not finite")
+    return value, rate, second
 
 
 # ---- outputs ------------------------------------------------------------------------------------------------------

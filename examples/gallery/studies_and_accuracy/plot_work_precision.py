@@ -26,9 +26,10 @@ span, measures = fd.Span(end=0.5, output_step=0.01), fd.measures_of(scene, ["def
 ladders = {name: [5e-4, 2.5e-4, 1.25e-4, 6.25e-5] for name in ("ros2", "ros3", "rk4")}  # steps in s
 with fd.pool(workers=0) as here:
     chart = fd.work_precision(scene, span, here, measures=measures, methods=ladders, repeats=1)
+scale = chart.scale("deflection:rod")
 for name in ladders:
     points = [point for point in chart.points if point.series == name]
-    plt.loglog([p.evaluations for p in points], [p.errors["deflection:rod"] for p in points], "o-", label=name)
+    plt.loglog([p.evaluations for p in points], [p.errors["deflection:rod"] / scale for p in points], "o-", label=name)
 plt.gca().set(xlabel="evaluations of the equations", ylabel="error of the deflection, relative to its largest")
 plt.gca().xaxis.set_minor_formatter("")
 plt.legend()

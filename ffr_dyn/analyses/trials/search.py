@@ -5,10 +5,12 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from ffr_dyn.analyses.integration import check_continues
 from ffr_dyn.analyses.trials.errors import Trial, beside_twin, further_runs, leap_of, with_its_errors
 from ffr_dyn.analyses.trials.faded import without_faded
 from ffr_dyn.analyses.trials.notes import finished
@@ -21,6 +23,7 @@ from ffr_dyn.consistency.step_error import (
     range_of,
 )
 from ffr_dyn.integrators import Within, stepped
+from ffr_dyn.results.file import load_result
 from ffr_dyn.results.result import Result
 from ffr_prep.common.errors import ComputationError, InputError
 
@@ -34,13 +37,18 @@ DEFLECTIONS = re.compile(r"\.displacement$")
 DRIVING = re.compile(r"\.(displacement|rotation|force|moment|effort|torque|tension)$|^measured\.")
 
 
-def searched(runs: Runs, within: Within, kept: dict[str, Any], count: int) -> Result:
-    """The run with the longest step found that keeps the accuracy; where forces ring, of those that keep the positions."""
-    trials, ringing, path = list[Trial](), set[str](), kept["path"] or kept["resume"]
+def searched(runs: Runs, within: Within, kept: dict[str, Any]) -> Result:
+    """The run with the longest step found that keeps the accuracy; where forces ring, of those that keep the positions.
+
+    A run that goes on makes the same trials as one from the start. The file to resume is one of them, begun at least: it
+    goes on where the search comes to its step, and stays as it is until then.
+    """
+    trials, ringing, path, count = list[Trial](), set[str](), kept["path"] or kept["resume"], FIRST
+    begun = _steps_done(runs, within, kept["resume"])
     while True:
         method = stepped(within, runs.output_step / count)
         try:
-            trial, _ = beside_twin(runs, method, count, kept)
+            trial, _ = beside_twin(runs, method, count, _kept(kept, path, count, begun))
             trial = _beside_last(runs, trial, trials)
         except (ComputationError, InputError):
             if count >= FINEST:
@@ -55,7 +63,27 @@ def searched(runs: Runs, within: Within, kept: dict[str, Any], count: int) -> Re
         trials.append(trial)
         if excess <= 1.0 or count >= FINEST:
             return finished(runs, trial, path, ringing)
-        count, kept = _next(count, excess, leap_of(method)), {**kept, "path": path, "resume": None}
+        count = _next(count, excess, leap_of(method))
+
+
+def _steps_done(runs: Runs, within: Within, resume: str | Path | None) -> int:
+    """Steps to a row of the trial that a file to resume holds; 0 without one.
+
+    Raises InputError where the file is not a trial of this search.
+    """
+    if resume is None or not Path(resume).exists():
+        return 0
+    step = load_result(resume).attributes.get("step") or runs.output_step
+    count = max(1, round(runs.output_step / step))
+    check_continues(resume, runs.assembled, stepped(within, runs.output_step / count), **runs.how)
+    return count
+
+
+def _kept(kept: dict[str, Any], path: str | Path | None, count: int, begun: int) -> dict[str, Any]:
+    """Where a trial is kept: in memory alone as long as the file holds a later one."""
+    if count < begun:
+        return {"path": None, "resume": None}
+    return {"path": path, "resume": kept["resume"] if count == begun else None}
 
 
 def _beside_last(runs: Runs, trial: Trial, earlier: Sequence[Trial]) -> Trial:

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
 from synthetic import cloud
 
+from ffr_dyn.analyses.events import Event
 from ffr_dyn.analyses.forward import forward
 from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.analyses.registry import summary
 from ffr_dyn.consistency.step_error import largest_difference, of_the_range, ranges
 from ffr_dyn.functions.formula import formula
 from ffr_dyn.integrators import RK4, ROS2, ROS3, AdaptiveROS3, Within, stepped, tolerances
-from ffr_dyn.integrators.stabilisation import Projection
+from ffr_dyn.integrators.stabilisation import Drifting, Projection
 from ffr_dyn.results.file import load_result
 from ffr_dyn.scene.drivers import Driver
 from ffr_dyn.scene.forces import Load
@@ -24,6 +26,7 @@ from ffr_prep.common.errors import ComputationError, InputError
 
 CLOSED = Projection(1e-8 * 1e-3)  # as far as a step that is found closes its constraints
 SPAN = {"end": 0.5, "output_step": 0.01}
+EVENT = Event("up", "hinge.angle", value=0.1)
 
 
 def swinging(damping: float, stiffer: float = 1.0) -> Scene:
@@ -121,30 +124,76 @@ def test_the_error_is_in_the_file_and_in_the_summary(tmp_path):
     assert not list(tmp_path.glob("*.attributes"))
 
 
-def test_a_run_that_goes_on_keeps_its_step(tmp_path):
-    path = tmp_path / "run.nc"
-    first = forward(driven(), end=0.25, output_step=0.01, path=path)
-    on = forward(driven(), end=0.5, output_step=0.01, resume=path)
-    method = ROS2(first.attributes["step"])
-    whole = integrate(driven(), end=0.5, output_step=0.01, method=method, stabilisation=CLOSED)
-    assert on["rod.q"].tobytes() == whole["rod.q"].tobytes()
+class StoppedError(Exception):
+    pass
 
 
-def test_a_search_that_was_stopped_goes_on(tmp_path):
-    path = tmp_path / "run.nc"
+def stopped(scene: Scene, path, trial: int, **settings) -> float:
+    """The step of the trial in which the search for a step was stopped, by its number."""
+    reached = [0.0]
 
-    class StoppedError(Exception):
-        pass
-
-    def stop(reached):
-        raise StoppedError
+    def progress(time):
+        reached.append(time)
+        if sum(after < before for before, after in pairwise(reached)) >= trial:
+            raise StoppedError
 
     with pytest.raises(StoppedError):
-        forward(swinging(0.02), **SPAN, path=path, progress=stop)
-    found, whole = forward(swinging(0.02), **SPAN, resume=path), forward(swinging(0.02), **SPAN)
-    assert found.attributes["step"] == whole.attributes["step"]
-    assert found["rod.q"].tobytes() == whole["rod.q"].tobytes()
-    assert load_result(path)["rod.q"].tobytes() == whole["rod.q"].tobytes()
+        forward(scene, **SPAN | settings, path=path, progress=progress)
+    return load_result(path).attributes["step"]
+
+
+def assert_same_run(found, whole):
+    assert {name: found.attributes.get(name) for name in whole.attributes} == whole.attributes
+    assert all(found[name].tobytes() == quantity.values.tobytes() for name, quantity in whole.quantities.items())
+
+
+@pytest.mark.parametrize("trial", [0, 1])
+def test_a_search_that_was_stopped_goes_on_to_the_same_run(tmp_path, trial):
+    """With the same step, errors and notes: what rings is known by two trials, one of them before the file's."""
+    scene, path = swinging(0.0, stiffer=100.0), tmp_path / "run.nc"
+    whole = forward(scene, **SPAN)
+    step = stopped(scene, path, trial)
+    assert (step == whole.attributes["step"]) == (trial == 1)
+    assert_same_run(forward(scene, **SPAN, resume=path), whole)
+    assert_same_run(load_result(path), whole)
+
+
+def test_a_search_to_a_later_end_is_that_of_the_long_run(tmp_path):
+    path = tmp_path / "run.nc"
+    forward(driven(), **SPAN | {"end": 0.25}, path=path)
+    whole = forward(driven(), **SPAN)
+    assert_same_run(forward(driven(), **SPAN, resume=path), whole)
+    assert_same_run(forward(driven(), **SPAN, resume=path), whole)  # nothing is left to do
+
+
+def test_a_step_that_was_given_is_not_one_that_was_found(tmp_path):
+    path, span = tmp_path / "run.nc", SPAN | {"end": 0.1}
+    forward(driven(), **span, method=ROS2(5e-3), path=path)
+    assert_same_run(forward(driven(), **span, resume=path), forward(driven(), **span))
+
+
+def test_an_accuracy_is_kept_where_the_stabilisation_does_not_tell_it(tmp_path):
+    path, how = tmp_path / "run.nc", SPAN | {"end": 0.1, "stabilisation": Drifting()}
+    forward(driven(), **how, method=Within(1e-2), path=path)
+    finer = how | {"method": Within(1e-4)}
+    assert_same_run(forward(driven(), **finer, resume=path), forward(driven(), **finer))
+
+
+@pytest.mark.parametrize(
+    ("change", "text"),
+    [
+        ({"scene": swinging(0.03)}, "another scene or of other settings"),
+        ({"end": 0.01}, "s beyond this end already"),
+        ({"events": (EVENT,)}, "cannot be resumed"),
+    ],
+)
+def test_a_search_leaves_a_file_that_it_does_not_continue(tmp_path, change, text):
+    path = tmp_path / "run.nc"
+    forward(driven(), **SPAN | {"end": 0.02}, path=path)
+    before = path.read_bytes()
+    with pytest.raises(InputError, match=text):
+        forward(**{"scene": driven()} | SPAN | change, resume=path)
+    assert path.read_bytes() == before
 
 
 @pytest.mark.parametrize("method", ["ros2", "ros3"])

@@ -10,6 +10,7 @@ import os
 import re
 import sys
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
@@ -406,6 +407,18 @@ def stepper(**more: object) -> Stepper:
     return Stepper(replace(HINGED, loads=(load,)), **{"method": ROS2(1e-3), **more})
 
 
+def gone_on(restored: bool) -> None:
+    """A step after one that failed."""
+    ends = Load("ends", "bar.b", function=lambda t, state: (np.nan if t > 0.01 else 0.0, 0, 0))
+    found = Stepper(replace(HINGED, loads=(ends,)), ROS2(1e-3))
+    kept = found.save()
+    with suppress(ComputationError):
+        found.step(20)
+    if restored:
+        found.restore(kept)
+    found.step()
+
+
 # ---- the cases ------------------------------------------------------------------------------------------------------------
 
 
@@ -583,6 +596,8 @@ INPUT = [
     Case(p(stepper, start=np.inf), stepper),
     Case(lambda: stepper().step(0), lambda: stepper().step(1)),
     Case(lambda: stepper().restore(stepper(start=1.0).save()), lambda: stepper().restore(stepper().save())),
+    Case(p(gone_on, restored=False), p(gone_on, restored=True)),
+    Case(lambda: stepper().set_inputs(push=(1.0, 2.0)), lambda: stepper().set_inputs(push=(1.0, 2.0, 0.0))),
     Case(lambda: stepper().set_inputs(push=np.inf), lambda: stepper().set_inputs(push=1.0)),
     Case(lambda: stepper().set_inputs(pull=1.0), lambda: stepper().set_inputs(push=1.0)),
     Case(p(stepper, outputs=("push.work",)), p(stepper, outputs=("push.power",))),

@@ -23,6 +23,7 @@ from ffr_dyn.analyses.kinematic import Kinematic
 from ffr_dyn.analyses.settings import Settings
 from ffr_dyn.chart.diagram import COSTS, Diagram, Lost, Point, measures_of, quantities_of, run_variants, work_precision
 from ffr_dyn.chart.draw import draw_chart
+from ffr_dyn.chart.meaning import check_meaning
 from ffr_dyn.chart.measures import Deflection, measure_of
 from ffr_dyn.chart.page import page, write_page
 from ffr_dyn.chart.pareto import pareto_front
@@ -55,7 +56,9 @@ def swinging(n: int = 5) -> Scene:
 
 
 def rigid() -> Scene:
-    model = rigid_body("arm", mass=1.0, inertia=np.full(3, 0.1), centre_of_mass=(0.5, 0, 0), points={"a": (0, 0, 0)})
+    model = rigid_body(
+        "arm", mass=1.0, inertia=np.full(3, 0.1), centre_of_mass=(0.5, 0, 0), points={"a": (0, 0, 0), "b": (1, 0, 0)}
+    )
     joint = Joint("hinge", "revolute", "ground.O", "arm.a")
     return Scene((Body("arm", model),), (joint,), ground={"O": (0, 0, 0)}, gravity=(0, -9.81, 0))
 
@@ -185,7 +188,8 @@ def test_every_measure_reads_its_history():
     np.testing.assert_array_equal(values("position:rod.b"), result["rod.b.position"])
     np.testing.assert_array_equal(values("reaction:hinge"), result["hinge.force"])
     np.testing.assert_array_equal(values("moment:hinge"), result["hinge.moment"])
-    np.testing.assert_array_equal(values("rod.b.velocity.x")[:, 0], result["rod.b.velocity.x"])
+    for part in ("velocity.x", "velocity.y", "position.z"):
+        np.testing.assert_array_equal(values(f"rod.b.{part}"), result[f"rod.b.{part}"][:, None])
     np.testing.assert_array_equal(values("deflection:rod.b"), result["rod.b.displacement"])
     u = np.einsum("pcj,tj->tpc", scene.bodies[0].model.surface.Phi, result["rod.q"])
     whole = np.sqrt((values("deflection:rod") ** 2).sum(1))
@@ -215,9 +219,88 @@ def test_a_body_that_became_rigid_has_no_deflection():
     assert all((values == 0).all() for values in outcome.values.values())
 
 
+def test_a_quantity_that_a_rigid_body_does_not_have_is_zero():
+    scene = swinging()
+    measures = measures_of(scene, ["rod.b.displacement.y"])
+    outcome = perform(Job(scene, Variant("ros2", 0.0125, Model("rigid", 0)), SPAN, measures, repeats=1))
+    assert isinstance(outcome, Outcome)
+    assert (outcome.values["rod.b.displacement.y"] == 0).all()
+
+
+@pytest.mark.parametrize("part", ["", ".2"])
+@pytest.mark.parametrize("model", [Model("rigid", 0), Model("1 mode", 1), Model("3 modes", 3)])
+def test_elastic_coordinates_of_other_models_are_not_compared(part, model):
+    scene = swinging()
+    measures = measures_of(scene, [f"rod.q{part}"])
+    with pytest.raises(InputError, match=f"'{model.label}' has others; measure what they do, as by deflection:rod"):
+        work_precision(scene, SPAN, Here(), measures=measures, models=(FULL, model))
+    check_meaning(scene, measures, (FULL, Model("without I5", drop=("I5",))))
+
+
+@pytest.mark.parametrize("text", ["deflection:rod", "deflection:rod.b", "rod.b.displacement.x", "rod.R"])
+def test_what_is_seen_from_other_frames_is_not_compared(text):
+    """A body in a frame at its point a, and the same in its mean-axis frame."""
+    scene, own = swinging(), {"reference": {"type": "Fixed", "at": "a"}}
+    fixed, mean = (
+        replace(scene.bodies[0].model, provenance=kind) for kind in (own, {"reference": {"type": "MeanAxis"}})
+    )
+    scene = replace(scene, bodies=(replace(scene.bodies[0], model=fixed),))
+    models = (FULL, Model("2 modes", 2), Model("rigid", 0))
+    check_meaning(scene, measures_of(scene, [text]), models)
+    with pytest.raises(InputError, match="seen from the frame of body 'rod', and 'mean' has another frame"):
+        check_meaning(scene, measures_of(scene, [text]), (*models, Model("mean", bodies={"rod": mean})))
+    others = measures_of(scene, ["position:rod.b", "deflection:rod.b/a,c", "energy"])
+    check_meaning(scene, others, (*models, Model("mean", bodies={"rod": mean})))
+
+
+@pytest.mark.parametrize("text", ["deflection:rod", "deflection:rod.b/a,c", "rod.b.displacement", "rod.R", "rod.q"])
+def test_what_is_of_a_body_is_not_compared_with_its_parts(text):
+    """Parts have frames and coordinates of their own; a deflection of the whole would be taken for zero."""
+    scene = swinging()
+    whole = scene.bodies[0].model
+    a, b, c = whole.interfaces
+    first = replace(whole, interfaces=(a, replace(c, name="cut_1_a")))
+    second = replace(whole, interfaces=(replace(c, name="cut_1_b"), b, c))
+    both = replace(whole, mass=2 * whole.mass, parts=(first, second))
+    models = (FULL, Model("parts", bodies={"rod": both}))
+    check_meaning(scene, measures_of(scene, ["position:rod.b", "reaction:hinge", "rod.b.velocity.x"]), models)
+    with pytest.raises(InputError, match="in 'parts' the body is in parts"):
+        check_meaning(scene, measures_of(scene, [text]), models)
+
+
+def test_models_of_one_label_are_refused():
+    scene = swinging()
+    with pytest.raises(InputError, match="2 models with the label 'full model'"):
+        work_precision(scene, SPAN, Here(), models=(FULL, Model(modes=2)))
+
+
+def test_a_step_that_is_named_twice_is_run_once():
+    assert [v.number for v in grid(swinging(), [FULL], {"ros2": (0.1, 0.05, 0.1)}, 0.1)] == [0.1, 0.05]
+
+
+@pytest.mark.parametrize("text", ["position:arm.a", "arm.v"])
+def test_what_moves_by_rounding_alone_is_no_reason_for_finer_steps(text):
+    """The end of an arm on its hinge stays where it is, but for rounding."""
+    scene = replace(rigid(), plane="none")
+    texts = ["position:arm.b", text]
+    found = reference(scene, SPAN, measures_of(scene, texts), Projection(), Here(), limit=1.0, wanted=1e-5)
+    assert len([line for line in found.story if "from twice the step" in line]) < 12
+    assert all(found.floors[name] <= 1e-5 * found.scales[name] for name in found.floors)
+
+
+def test_the_scale_of_what_hardly_moves_is_a_thousandth_of_its_kind():
+    scene = swinging()
+    measures = measures_of(scene, ["rod.a.velocity", "rod.b.velocity", "rod.b.velocity.x", "constraint"])
+    outcome = perform(Job(scene, Variant("ros2", 0.0125), SPAN, measures, repeats=1))
+    still, moves, part, violation = outcome.scales.values()
+    assert 0.5e-3 < still / moves < 2e-3
+    assert 1e-2 < part / moves <= 1
+    assert violation == 0
+
+
 def test_default_measures_follow_the_scene():
     assert [m.name for m in measures_of(swinging(), ())] == ["position:rod.c", "deflection:rod"]
-    assert [m.name for m in measures_of(rigid(), ())] == ["position:arm.a"]
+    assert [m.name for m in measures_of(rigid(), ())] == ["position:arm.b"]
 
 
 # ---- failures -------------------------------------------------------------------------------------------------------
@@ -584,6 +667,10 @@ def test_another_body_file_is_a_model(scene_file, tmp_path):
         (["--method", "ros5"], "no method 'ros5'; did you mean 'ros3'"),
         (["--method", "ros2=fast"], "write it as NAME=NUMBER"),
         (["--method", "ros2=-1e-3"], "must be positive"),
+        (["--method", "ros2=0.0125", "--method", "ros2"], "--method ros2 is given twice"),
+        (["--body", "rod=swing.rod.ffr", "--body", "rod=x.ffr"], "--body rod is given twice"),
+        (["-m", "rod.b.position.up"], "did you mean rod.b.position"),
+        (["-m", "rod.q", "--modes", "2,all"], "'2 modes' has others; measure what they do"),
         (["--modes", "2,some"], "write it as 2,4,8,all"),
         (["--modes=-2"], "cannot keep -2 modes"),
         (["--drop", "I7"], "no term 'I7' to drop"),

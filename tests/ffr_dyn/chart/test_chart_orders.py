@@ -11,7 +11,7 @@ from test_dyn_references import GRAVITY, mass_point
 
 import ffr_prep as fp
 from ffr_dyn.chart.diagram import Diagram, measures_of, work_precision
-from ffr_dyn.chart.orders import observed_order, orders
+from ffr_dyn.chart.orders import observed_order, order_words, orders
 from ffr_dyn.chart.runner import Here, Span
 from ffr_dyn.functions.time_functions import polynomial
 from ffr_dyn.integrators import METHODS
@@ -153,5 +153,18 @@ def test_an_observed_order_is_the_slope_above_the_floor():
     steps = [0.1 / 2**k for k in range(6)]
     errors = [max(3 * h**3, 1e-6) for h in steps]
     assert observed_order(steps, errors, floor=1e-6) == pytest.approx(3.0)
-    assert np.isnan(observed_order(steps, [1e-6] * 6, floor=1e-6))
-    assert np.isnan(observed_order([0.1], [1.0]))
+
+
+@pytest.mark.parametrize(
+    ("steps", "errors", "words"),
+    [
+        ([0.1, 0.05, 0.025], [1e-3, 9e-4, 9e-4], "level"),
+        ([0.1, 0.05], [1e-6, 1e-6], "not to be seen"),  # all as good as the reference
+        ([0.1, 0.05], [1.0, 1e-6], "not to be seen"),
+        ([0.1], [1.0], "not to be seen"),
+        ([0.1, 0.1], [1.0, 1.0], "not to be seen"),
+        ([0.1, 0.05, 0.05], [1.0, 0.25, 0.25], "2.0"),
+    ],
+)
+def test_where_errors_do_not_fall_is_not_where_they_are_not_seen(steps, errors, words):
+    assert order_words(observed_order(steps, errors, floor=1e-6)) == words

@@ -223,6 +223,36 @@ def test_after_a_failure_a_state_can_be_restored():
     np.testing.assert_array_equal(stepped(stepper, 5)["bob.c.position"], expected)
 
 
+def test_inputs_are_set_all_or_none_and_by_any_three_numbers():
+    stepper = Stepper(TWISTED, METHOD)
+    (before,) = stepper.inputs.values()
+    with pytest.raises(InputError, match="no input 'other'"):
+        stepper.set_inputs(torque=before + 1.0, other=1.0)
+    assert stepper.inputs == {"torque": before}
+    for three in ([1.0, 2.0, 3.0], np.array([1.0, 2.0, 3.0]), (1, 2, 3)):
+        stepper.set_inputs(torque=three)
+        ahead = stepper.save()
+        stepper.step(10)
+        assert stepper.inputs["torque"] == pytest.approx(1 + 2 * stepper.time + 1.5 * stepper.time**2)
+        stepper.restore(ahead)
+
+
+def test_a_step_that_failed_on_its_way_is_no_state_to_go_on_from():
+    """Of 100 steps the 26th fails: time and outputs are those before, the state inside is not."""
+    push = Load("push", "bob.c", function=lambda t, state: (np.nan if t > 0.05 else 0.0, 0, 0))
+    stepper = Stepper(replace(TWISTED, loads=(push,)), METHOD)
+    kept = stepper.save()
+    with pytest.raises(ComputationError, match=r"'push' at t = 0\.05"):
+        stepper.step(100)
+    assert stepper.time == 0.0
+    for going_on in (stepper.step, stepper.save):
+        with pytest.raises(InputError, match="failed on its way: restore a state"):
+            going_on()
+    stepper.restore(kept)
+    other = Stepper(replace(TWISTED, loads=(push,)), METHOD)
+    np.testing.assert_array_equal(stepped(stepper, 5)["bob.c.position"], stepped(other, 5)["bob.c.position"])
+
+
 def test_steps_leave_no_memory_behind():
     stepper = Stepper(TWISTED, METHOD, outputs=("bob.c.position", "hinge.angle"))
     for _ in range(50):
@@ -287,8 +317,13 @@ def test_mistakes_are_named():
     for bad in (np.nan, np.inf, (0.0, np.nan, 0.0)):
         with pytest.raises(InputError, match=r"'torque'.* not finite"):
             stepper.set_inputs(torque=bad)
-    with pytest.raises(InputError, match="by one step or more, not by 0"):
-        stepper.step(0)
+    for bad in ("much", None, (1.0, 2.0), [], [[1.0, 2.0, 3.0]], 1j):
+        with pytest.raises(InputError, match=r"'torque' is .*; give a number, or three"):
+            stepper.set_inputs(torque=bad)
+    for bad in (0, -1, 0.5, 1.5, np.nan, np.inf, "2"):
+        with pytest.raises(InputError, match=f"by one whole step or more, not by {bad!r}"):
+            stepper.step(bad)
+    assert stepper.time == 0.0
     with pytest.raises(InputError, match="another scene, method"):
         stepper.restore(Stepper(TWISTED, ROS2(2e-3)).save())
 

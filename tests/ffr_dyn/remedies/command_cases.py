@@ -110,6 +110,7 @@ COMMANDS = [
     Case(p(parted, "reduce-structure far.toml"), p(parted, "reduce-structure strip.toml")),
     Case(p(command, CHART + " --end -1"), chart),
     Case(p(command, CHART.replace("1e-2", "0")), chart),
+    Case(p(command, CHART + " --method ros2=1e-2"), chart),
 ]
 
 LOADED = '[loads.{name}]\nmarker = "rod.tip"\nforce = [0, {force}, 0]\n'

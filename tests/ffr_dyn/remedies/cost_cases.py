@@ -18,9 +18,10 @@ from synthetic import cloud
 from ffr_dyn.analyses.events import Event
 from ffr_dyn.chart.diagram import Diagram, Lost, measures_of, work_precision
 from ffr_dyn.chart.draw import draw_chart
+from ffr_dyn.chart.meaning import check_meaning
 from ffr_dyn.chart.reference import reference
 from ffr_dyn.chart.runner import Failure, Here, Job, Span, _started, perform, pool
-from ffr_dyn.chart.variants import FULL, Variant, models_of
+from ffr_dyn.chart.variants import FULL, Model, Variant, models_of
 from ffr_dyn.economy.model_choice import applied, full
 from ffr_dyn.economy.policy import Policy
 from ffr_dyn.economy.report import write_report
@@ -64,6 +65,22 @@ def measured(wrong: str, right: str, scene: Scene = SWING, other: Scene = SWING)
     return Case(p(lost, scene, wrong), p(lost, other, right))
 
 
+def compared(models: tuple[Model, ...], text: str = "position:cloud.b") -> None:
+    check_meaning(SWING, measures_of(SWING, [text]), models)
+
+
+OTHER_FRAME = Model("other", bodies={"cloud": replace(cloud(2), provenance={"reference": {"type": "MeanAxis"}})})
+
+
+def in_parts() -> Model:
+    """A model of the body in two parts, one upon the other."""
+    whole = cloud(2)
+    a, b, c = whole.interfaces
+    parts = ((a, replace(c, name="cut_1_a")), (replace(c, name="cut_1_b"), b, c))
+    both = replace(whole, mass=2 * whole.mass, parts=tuple(replace(whole, interfaces=of) for of in parts))
+    return Model("parts", bodies={"cloud": both})
+
+
 def referred(limit: float) -> object:
     span, measures = Span(0.04, 0.01), measures_of(HINGED, ["position:bar.b"])
     return reference(HINGED, span, measures, Projection(), Here(), limit=limit)
@@ -101,6 +118,13 @@ CHARTS = [
     measured("speed:cloud.b", "position:cloud.b"),
     measured("cloud.b.positon", "cloud.b.position"),
     measured("reaction:hing", "reaction:hinge"),
+    Case(p(compared, (FULL, Model(modes=1))), p(compared, (FULL, Model("1 mode", modes=1)))),
+    Case(
+        p(compared, (FULL, Model("1 mode", modes=1)), "cloud.q"),
+        p(compared, (Model("1 mode", modes=1),), "deflection:cloud"),
+    ),
+    Case(p(compared, (in_parts(),), "deflection:cloud"), p(compared, (in_parts(),), "position:cloud.b")),
+    Case(p(compared, (OTHER_FRAME,), "deflection:cloud"), p(compared, (OTHER_FRAME,), "deflection:cloud.b/a,c")),
     measured("deflection:cloud.b/a", "deflection:cloud.b/a,c"),
     measured("deflection:cloud.b/a,a", "deflection:cloud.b/a,c"),
     measured("deflection:cloud", "deflection:cloud.b", BARE, BARE),
