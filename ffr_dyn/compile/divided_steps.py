@@ -55,6 +55,11 @@ class Fast:
     @property
     def words(self) -> tuple[str, ...]:
         """What is done about the spans."""
+        return tuple(f"{text}; steps are divided there" for text in self.faster)
+
+    @property
+    def faster(self) -> tuple[str, ...]:
+        """What changes faster than a step, and when."""
         if not len(self.spans):
             return ()
         names = ", ".join(self.purposes[:NAMES]) + ", ..." * (len(self.purposes) > NAMES)
@@ -63,8 +68,7 @@ class Fast:
         times = ", ".join(f"{t:.6g}" for t in begun[:TIMES]) + ", ..." * (len(begun) > TIMES)
         shortest = float((self.spans[:, 1] - self.spans[:, 0]).min())
         return (
-            f"{names}: changes within {shortest:.2g} s, faster than a step of {self.step:.3g} s, from t = {times} s on; "
-            "steps are divided there",
+            f"{names}: changes within {shortest:.2g} s, faster than a step of {self.step:.3g} s, from t = {times} s on",
         )
 
 
@@ -79,9 +83,32 @@ def fast_of(system: System, start: float, end: float, output_step: float, step: 
     made = made_of(functions.kind, functions.start, functions.data, system.model.rows.function, functions.switches)
     if not 0 < end - start < np.inf or slow(made, functions.kind, functions.start, step):
         return None  # what is no span the run tells
-    rows = np.linspace(start, end, 1 + int(np.clip(round((end - start) / output_step), 1, MOST_ROWS)))
+    rows = _times(start, end, output_step)
     found = _with_python(system, made, rows, step) or _written(system, made, rows, step)
     _refuse_poles(system, made, found, (start, end, step))
+    return _named(system, found, step)
+
+
+def too_fast(system: System, start: float, end: float, step: float) -> list[str]:
+    """What of the functions that are not Python's has changed faster than steps that nobody divides, and what mends it."""
+    functions = system.model.functions
+    made = made_of(functions.kind, functions.start, functions.data, system.model.rows.function, functions.switches)
+    if not 0 < end - start < np.inf or slow(made, functions.kind, functions.start, step):
+        return []
+    try:
+        found = _written(system, made, _times(start, end, step), step)
+        _refuse_poles(system, made, found, (start, end, step))
+    except (InputError, ComputationError) as error:
+        return [str(error)]
+    fast = _named(system, found, step)
+    return [f"{text}; take shorter steps" for text in fast.faster] if fast else []
+
+
+def _times(start: float, end: float, apart: float) -> Array:
+    return np.linspace(start, end, 1 + int(np.clip(round((end - start) / apart), 1, MOST_ROWS)))
+
+
+def _named(system: System, found: Changes, step: float) -> Fast | None:
     names = dict.fromkeys(name for name, fast in zip(system.purposes, found.which, strict=True) if fast)
     changes = len(found.spans) + len(found.jumps) + len(found.switches)
     return Fast(found.spans, tuple(names), found.jumps, found.switches, step) if changes else None

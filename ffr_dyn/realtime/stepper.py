@@ -25,6 +25,7 @@ from typing import Any
 import numpy as np
 
 from ffr_dyn.analyses.checkpoint import fingerprint, leaves
+from ffr_dyn.compile.divided_steps import too_fast
 from ffr_dyn.compile.engine import new_engine, row_filler
 from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.compile.workspace import new_record
@@ -161,11 +162,13 @@ class Stepper(Brief):
 
     def doubts(self) -> list[str]:
         """Doubts about the states at which this was asked, beside the notes of assembly: as the notes of `forward`
-        (the table in docs/analyses.md), but for the energy, and nothing is an error."""
+        (the table in docs/analyses.md), but for the energy, and nothing is an error. Of the time since the start, that
+        functions of time that are not Python's have changed faster than the steps."""
         loop = self._loops[0]
         look(self._seen, View(loop.system, loop.record))
         steps = between_rows(self._seen, loop.engine.system, loop.work, loop.record)
-        return [*self._seen.assembled.notes, *ended("stepper", self._seen, steps)]
+        fast = too_fast(self._system, self._start, self.time, self._step)
+        return [*self._seen.assembled.notes, *ended("stepper", self._seen, steps), *fast]
 
     def save(self) -> State:
         """The state, with inputs. Raises InputError after a step that failed."""

@@ -253,6 +253,25 @@ def test_a_step_that_failed_on_its_way_is_no_state_to_go_on_from():
     np.testing.assert_array_equal(stepped(stepper, 5)["bob.c.position"], stepped(other, 5)["bob.c.position"])
 
 
+@pytest.mark.parametrize(
+    ("force", "told"),
+    [
+        ("10 * abs(sin(2000 * t))", "force 'motor': changes within"),
+        ("exp(-((t - 0.0253) / 1e-4) ** 2)", "faster than a step of 0.001 s, from t = 0.025"),
+        ("sin(2 * t)", None),
+    ],
+)
+def test_functions_that_change_faster_than_steps_are_told(force, told):
+    """Once they have: a run divides its steps there, which a stepper does not."""
+    stepper = Stepper(arm(forces=(Actuator("motor", "hinge", force=formula(force)),)), METHOD)
+    stepper.step(10)
+    before = stepper.doubts()
+    stepper.step(20)
+    found = [text for text in stepper.doubts() if "motor" in text]
+    assert [told in text for text in found] == ([True] if told else [])
+    assert ("abs" in force) == any("motor" in text for text in before)
+
+
 def test_steps_leave_no_memory_behind():
     stepper = Stepper(TWISTED, METHOD, outputs=("bob.c.position", "hinge.angle"))
     for _ in range(50):
