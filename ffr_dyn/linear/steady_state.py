@@ -40,6 +40,7 @@ from ffr_dyn.functions.rotation import from_vector, product, rotation_matrix, sk
 from ffr_dyn.linear.hill import harmonics
 from ffr_dyn.linear.turning_on import turning_on
 from ffr_dyn.scene.force_kinds import forces_of
+from ffr_dyn.scene.forces.bushing import Bushing
 from ffr_dyn.scene.forces.force import Force
 from ffr_dyn.scene.forces.places import AtMarker, OnBody
 from ffr_dyn.scene.scene import markers
@@ -320,11 +321,11 @@ def steady_state(assembled: Assembled, time: float, start: Array | None = None) 
     together, refused = _together(found), _not_lasting(found)
     if refused and (together is None or _not_lasting(_followed(together, begin))):
         raise refused
-    varying, notes = np.inf if refused else _varying(found), tuple[str, ...]()
+    varying, notes = np.inf if refused else _varying(found), _turned_on(machine, found.x)
     if varying > VARIES and together is not None:
         one = _followed(together, begin)
         if (less := _varying(one)) < varying and not _not_lasting(one):
-            found, varying, notes = one, less, (ALL_TURN,)
+            found, varying, notes = one, less, (*notes, ALL_TURN)
     if varying > VARIES:
         found = _followed(replace(found.machine, phases=_phases(found.machine)), found.x)
         notes = (*notes, _varies(varying, found.machine.screws.rate))
@@ -361,11 +362,11 @@ def steady_here(system: System, time: float, x: Array, v: Array) -> Steady | Non
     apart = np.abs((v - velocities(machine.place, machine.screws, x)) / size).max(initial=0.0)
     if apart > SAME * max(machine.screws.fastest, float(np.abs(v / size).max(initial=0.0))):
         return None
-    found = _in_balance(machine, x)
+    found, notes = _in_balance(machine, x), _turned_on(machine, x)
     if found is not None and _varying(found) <= VARIES:
-        return found
+        return replace(found, notes=notes)
     found = _in_balance(replace(machine, phases=_phases(machine)), x)
-    return found and replace(found, notes=(_varies(_varying(_at(machine, x)), machine.screws.rate),))
+    return found and replace(found, notes=(*notes, _varies(_varying(_at(machine, x)), machine.screws.rate)))
 
 
 def _in_balance(machine: Machine, x: Array) -> Steady | None:
@@ -390,6 +391,23 @@ def _phases(machine: Machine) -> tuple[float, ...]:
     """[s] in which all bodies have turned by whole turns; the fastest by one, where there is but one speed."""
     fastest, (_, turns) = machine.screws.fastest, machine.screws.in_whole_turns()
     return tuple(2 * np.pi / fastest * k / PHASES for k in range(PHASES * turns)) if fastest else (0.0,)
+
+
+def _turned_on(machine: Machine, x: Array) -> tuple[str, ...]:
+    """Notes on bushings whose ends turn against each other for good, and that are stiff against rotation."""
+    now = At(machine.system.scene, machine.place, machine.time, x, velocities(machine.place, machine.screws, x))
+    stiff = [
+        force
+        for force in forces_of(now.scene)
+        if isinstance(force, Bushing) and (force.stiffness_matrix[3:].any() or any(force.curves[3:]))
+    ]
+    against = [np.linalg.norm(np.diff(_ends(machine.screws, now, force)[1], axis=0)) for force in stiff]
+    return tuple(
+        f"bushing {force.name!r} is turned on and on, and its moments are for less than half a turn: they are no bearing's. "
+        "Leave out its stiffness against rotation; two bushings at a distance along the axis hold a shaft against tilting"
+        for force, turning in zip(stiff, against, strict=True)
+        if turning > SAME * machine.screws.fastest
+    )
 
 
 def _varies(varying: float, rate: float) -> str:

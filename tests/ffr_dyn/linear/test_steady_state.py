@@ -121,6 +121,17 @@ def test_dampers_to_the_ground_push_what_turns():
     assert np.abs(seen - expected).min() < 1e-6 * abs(expected)
 
 
+@pytest.mark.parametrize(("speed", "tilting", "told"), [(30.0, 50.0, 1), (0.0, 50.0, 0), (30.0, 0.0, 0)])
+def test_a_bushing_that_is_no_bearing_is_told(speed, tilting, told):
+    """Its moments are those of a rotation vector, whose tilting goes to zero at half a turn."""
+    disc = fd.rigid_body("disc", mass=2.0, inertia=(0.1, 0.1, 0.2), points={"c": (0, 0, 0)})
+    support = fd.Bushing("support", "ground.O", "disc.c", (800, 800, 800, tilting, tilting, 0))
+    scene = fd.Scene((fd.Body("disc", disc, omega_bar=(0, 0, speed)),), forces=(support,), ground={"O": (0, 0, 0)})
+    said = "bushing 'support' is turned on and on"
+    assert sum(said in note for note in fd.linearise(scene).notes) == told
+    assert sum(said in note for note in fd.steady(scene).attributes["notes"]) == told
+
+
 def test_screws_carry_bodies():
     place = (assembled := assemble(in_space(governor(6.0)))).system.layout
     screws = screws_of(place, assembled.x, assembled.v)
