@@ -22,10 +22,12 @@ from ffr_dyn.equations.inertia import kept_integrals, mass_matrix
 from ffr_dyn.integrators import Integrator
 from ffr_dyn.integrators.stabilisation import Projection, Stabilisation
 from ffr_dyn.kernels.tables import MOMENT, OPENED, PHI, Record, Work
-from ffr_dyn.results.power import driven
+from ffr_dyn.results.power import driven, measured_values
 from ffr_dyn.results.recorded_motion import View, dot
 from ffr_dyn.scene.drivers import Driver, PointDriver
 from ffr_dyn.scene.force_kinds import forces_of
+from ffr_dyn.scene.forces.force import Force
+from ffr_dyn.scene.forces.places import BetweenAxes
 from ffr_dyn.scene.scene import Body, Scene, joint_of
 from ffr_prep.body import remembered
 from ffr_prep.common.arrays import Array
@@ -54,13 +56,14 @@ TABLE: dict[str, dict[str, str]] = {
     "energy multiplied": _verdicts(ERROR, NONE, NONE, NONE, NONE),  # at once, by `ffr_dyn.analyses.energy`
     "energy come or gone": _verdicts(NOTE, NONE, NONE, NONE, NONE),
     "force too stiff for the step": _verdicts(NOTE, NOTE, NONE, NONE, NONE),
+    "bushing turned by half a turn": _verdicts(NOTE, NOTE, NONE, NOTE, NOTE),
     "deformed beyond the theory": _verdicts(NOTE, NOTE, NONE, NOTE, NOTE),
     "deformed beyond any meaning": _verdicts(ERROR, NOTE, NONE, ERROR, ERROR),
     "spin without stiffening": _verdicts(NOTE, NOTE, NONE, NONE, NOTE),
     "singular position": _verdicts(NOTE, NOTE, NOTE, NONE, NONE),
     "mass matrix nearly singular": _verdicts(NOTE, NOTE, NONE, NOTE, NOTE),
 }
-OPEN, APART, ASTRAY, QUICK, _, BALANCE, STIFF, STRAINED, MEANINGLESS, SPUN, SINGULAR, MASS = TABLE
+OPEN, APART, ASTRAY, QUICK, _, BALANCE, STIFF, WOUND, STRAINED, MEANINGLESS, SPUN, SINGULAR, MASS = TABLE
 
 MET = 1e-8  # m, -: of constraints that Newton's method closes
 KEPT = 10.0  # times the tolerance of a projection
@@ -81,8 +84,8 @@ class Seen:
     tolerance : that constraints are to be met with [m, -];  apart : from where a mechanism has come apart
     arrays    : "bodies" (3, B) as `ffr_dyn.consistency.validity.extremes`; "open" (3,) the largest constraint left open, its
                 time, its number; "driven" (2, D) of each driver the largest difference from what it prescribes, and its
-                largest second derivative; "rates" (F,) [1/s] of the forces that the method takes explicitly; "x" (X,) of the
-                last row
+                largest second derivative; "rates" (F,) [1/s] of the forces that the method takes explicitly; "wound" (F,)
+                [rad] how far the axes of forces in six directions are turned against each other; "x" (X,) of the last row
     """
 
     assembled: Assembled
@@ -102,7 +105,7 @@ def nothing_seen(
     """Before the first row."""
     scene = assembled.system.scene
     sizes = {"bodies": (3, len(scene.bodies)), "open": (3,), "driven": (2, len(scene.drivers))}
-    sizes |= {"rates": (len(forces_of(scene)),), "x": (assembled.x.size,)}
+    sizes |= {"rates": (len(forces_of(scene)),), "wound": (len(forces_of(scene)),), "x": (assembled.x.size,)}
     return Seen(assembled, method, tolerance, apart, {name: np.zeros(size) for name, size in sizes.items()})
 
 
@@ -128,8 +131,20 @@ def look(seen: Seen, view: View) -> None:
         arrays["open"][:] = _opened(seen.assembled, rows, worst)
     if seen.scene.drivers:
         arrays["driven"][:] = np.maximum(arrays["driven"], np.array([_driven(view, d) for d in seen.scene.drivers]).T)
+    arrays["wound"][:] = np.maximum(arrays["wound"], [_wound(view, k, force) for k, force in _forces(seen)])
     if seen.method is not None and (explicit := candidates(system, seen.method)):
         arrays["rates"][:] = np.maximum(arrays["rates"], fastest(evaluator(system), rows, explicit))
+
+
+def _forces(seen: Seen) -> Iterator[tuple[int, Force]]:
+    return enumerate(forces_of(seen.scene))
+
+
+def _wound(view: View, k: int, force: Force) -> float:
+    """[rad] of a force in six directions, between its markers."""
+    if not isinstance(force.place, BetweenAxes):
+        return 0.0
+    return float(np.linalg.norm(measured_values(view, k, slice(3, 6)), axis=1).max(initial=0.0))
 
 
 def _opened(assembled: Assembled, rows: Record, row: int) -> tuple[float, float, float]:
@@ -213,6 +228,7 @@ def _found(seen: Seen) -> dict[str, list[str]]:
         ],
         QUICK: quick,
         STIFF: [] if seen.method is None else told(seen.assembled.system, seen.method, seen.arrays["rates"]),
+        WOUND: [text for k, force in _forces(seen) if (text := force.beyond(float(seen.arrays["wound"][k])))],
         STRAINED: strained(scene, turned, stretched),
         MEANINGLESS: [lost] if lost else [],
         SPUN: unstiffened(scene, spun),

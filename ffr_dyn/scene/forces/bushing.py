@@ -19,6 +19,8 @@ from ffr_dyn.scene.forces.spring_law import elastic_energy
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 
+_HALF_A_TURN = 0.95 * np.pi  # rad, from where on the ends may come out turned the other way
+
 
 @register_force
 @dataclass(frozen=True)
@@ -120,6 +122,16 @@ class Bushing(Force):
         slopes = [dominating(self.stiffness_matrix), dominating(self.damping_matrix)]
         parts = [self.stiffness_matrix, self.damping_matrix, np.array(self.preload, float), np.array(curves), *slopes]
         return LawNumbers(np.concatenate([np.ravel(part) for part in parts]))
+
+    def beyond(self, turned: float) -> str | None:
+        tilting = any(k is not None for k in self.curves[3:]) or bool(self.stiffness_matrix[3:].any())
+        if turned < _HALF_A_TURN or not tilting:
+            return None
+        return (
+            f"bushing {self.name!r}: its ends are turned by {turned:.3g} rad against each other, and at half a turn its "
+            "moment reverses: it knows no further turns; give it no stiffness against rotation, or hold the turn with a "
+            "joint and a spring on its angle"
+        )
 
     def energy(self, c: Array) -> Array:
         total, K = np.zeros(len(c)), self.stiffness_matrix

@@ -114,6 +114,10 @@ class Force(ABC):
         """What it does not do in the scene, and may be meant to, in sentences."""
         return ()
 
+    def beyond(self, turned: float) -> str | None:
+        """What is wrong with it, in a sentence, where the axes of its markers are turned by so much [rad] at most."""
+        return None
+
     def drawn(self, scene: Scene) -> dict[str, Any]:
         """What a picture of it needs beside its markers, in JSON values (`ffr_dyn.scene.forces.places.Place.drawn`)."""
         return self.place.drawn(scene)

@@ -27,7 +27,7 @@ from ffr_dyn.integrators import RK4, ROS2
 from ffr_dyn.integrators.stabilisation import Drifting
 from ffr_dyn.realtime.stepper import Stepper
 from ffr_dyn.scene.drivers import Driver
-from ffr_dyn.scene.forces import Actuator, JointFriction, JointSpring, JointStop
+from ffr_dyn.scene.forces import Actuator, Bushing, JointFriction, JointSpring, JointStop
 from ffr_dyn.scene.joints import Joint
 from ffr_dyn.scene.scene import Body, Scene
 from ffr_prep.body import FlexibleBody
@@ -126,6 +126,13 @@ def heavy(share: float) -> Scene:
     return Scene((Body("body", replace(model, P_dm=P_dm, rP_dm=rP_dm)),), plane="none")
 
 
+def held(*rotation: float, **joint_spring: float) -> Scene:
+    """The turning bar in a bushing, or with a spring on its angle."""
+    mount = Bushing("mount", "ground.O", "bar.a", stiffness=(0, 0, 0, *rotation))
+    wind = [JointSpring("wind", "hinge", **joint_spring)] if joint_spring else []
+    return replace(TURNING, forces=(mount, *wind))
+
+
 STOP = JointStop("stop", "hinge", upper=0.1, stiffness=1e5, damping=100.0, entry=1e-3)
 OF_ITS_OWN = Actuator("own", "hinge", function=lambda t, state: -30.0 * state.omega_bar("bar")[2])
 
@@ -202,6 +209,14 @@ RAISED = [
         "'own' is too stiff",
         partial(stepped, replace(TURNING, forces=(OF_ITS_OWN,)), 0.03, 1),
         partial(stepped, replace(TURNING, forces=(OF_ITS_OWN,)), 0.01, 3),
+    ),
+    *(
+        (doubts.WOUND, r"'mount': its ends are turned by 3\.\d* rad .* reverses", partial(analyse, held(0, 0, 1e-3)), mended)
+        for analyse, mended in (
+            (partial(forward, h=0.05, rows=80), partial(forward, held(0, 0, 0), 0.05, 80)),
+            (partial(forward, h=0.05, rows=80), partial(forward, held(0, 0, 0, stiffness=1e-3), 0.05, 80)),
+            (partial(stepped, h=0.05, rows=80), partial(stepped, held(0, 0, 0), 0.05, 80)),
+        )
     ),
     *(
         (doubts.STRAINED, "turns within itself", partial(analyse, bent(0.5)), partial(analyse, bent(0.01)))
