@@ -18,7 +18,7 @@ import numpy as np
 from ffr_dyn.compile.engine import fill_rows, new_engine
 from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.compile.workspace import new_record
-from ffr_dyn.consistency.balance import Account, add_rows, amiss, lost_rebounds
+from ffr_dyn.consistency.balance import Account, add_rows, amiss, lost_rebounds, missed_by_rows
 from ffr_dyn.consistency.evaluation import evaluator, joined, record_states
 from ffr_dyn.consistency.explicit_forces import candidates, fastest, told
 from ffr_dyn.consistency.tangent import chart, state_matrix
@@ -95,6 +95,16 @@ class EnergyWatch:
     def lost_rebounds(self) -> list[str]:
         """What tells that the steps are too long for the stops that are met."""
         return lost_rebounds(self.account, 0.0 if self.method.controlled else self.method.step)
+
+    def stops_between_rows(self) -> list[str]:
+        """Notes on stops whose force rows miss."""
+        found = []
+        for k, between in self.account.between.items():
+            first = _row(between.rows, 0, between.rows.energy[:, 0])
+            status, fine = self._again(first, float(between.rows.time[1]), 1)
+            if status == OK:
+                found += missed_by_rows(self.account, k, View(self.system, fine))
+        return found
 
     def look(self, view: View) -> None:
         """Take note of the rows that follow. Raises ComputationError when their energy comes from nowhere."""

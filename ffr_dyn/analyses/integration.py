@@ -581,6 +581,7 @@ def _account(run: _Run, notes: list[str]) -> dict[str, Any]:
         **_steps(run.engine),
         "largest_drift": [float(drift[PHI]), float(drift[PHI_DOT])],
         **({"rebounds": "; ".join(lost)} if (lost := run.energy.lost_rebounds()) else {}),
+        **({"missed": missed} if (missed := run.energy.stops_between_rows()) else {}),
         "notes": [
             *notes,
             *ended(

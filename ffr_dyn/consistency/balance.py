@@ -24,7 +24,7 @@ from ffr_dyn.results.recorded_motion import View
 from ffr_dyn.scene.force_kinds import forces_of
 from ffr_dyn.scene.forces import JointStop
 from ffr_dyn.scene.forces.force import Force
-from ffr_dyn.scene.forces.places import COORDINATE, RATE
+from ffr_dyn.scene.forces.places import COORDINATE, FORCE, RATE
 from ffr_prep.common.arrays import Array
 
 AMISS = 0.1  # of the largest kinetic, strain and spring energy: from where it is told
@@ -34,6 +34,7 @@ QUIET = 1e-6  # m^2/s^2, twice the energy by mass that is not looked at
 TIME, BEGUN, WORK, OPEN, MOST, WORST, WHEN, POWER, BEFORE, TOTAL, AT_STOPS, BESIDE = range(12)
 REACHED = 2.0  # times the steps from row to row: where a stop is as near, it may be met between them
 RESOLVED = 4.0  # steps in the time that a stop is met for, with fewer it gives back something else
+MISSED = 2.0  # times the largest force at rows, from where on that between them is told
 REBOUND = AMISS**2  # of the largest energy, which comes back from a stop: from where on its loss is told
 
 
@@ -47,6 +48,14 @@ class Met:
 
 
 @dataclass(frozen=True)
+class Between:
+    """Two rows, as a record, between which a stop may be met, and how fast it is approached."""
+
+    rows: Record
+    rate: float
+
+
+@dataclass(frozen=True)
 class Account:
     """The account of the energy of a run: the rows so far.
 
@@ -54,13 +63,16 @@ class Account:
               motion and strain, largest difference between energy and work, its time, power of the last row and of the one
               before, energy of the last row
     moments : (K,) [s] at which functions of time change between rows, beside those that they break at
-    met     : by the number of a stop the fastest approach to it
+    met     : by the number of a stop the fastest approach to it;  between : the fastest that rows miss
+    pushed  : by the number of a stop its largest force at a row [N]
     """
 
     system: System
     moments: Array = field(default_factory=lambda: np.zeros(0))
     numbers: Array = field(default_factory=lambda: np.full(12, np.nan))
     met: dict[int, Met] = field(default_factory=dict)
+    between: dict[int, Between] = field(default_factory=dict)
+    pushed: dict[int, float] = field(default_factory=dict)
 
 
 def add_rows(account: Account, rows: Record, powers: Array) -> Array:
@@ -122,7 +134,36 @@ def _beside_stops(account: Account, rows: Record, steps: Array) -> Array:
         if near[row] and (k not in account.met or abs(rate[row]) > abs(account.met[k].rate)):
             own = Record(*(column[row : row + 1].copy() for column in rows))
             account.met[k] = Met(own, float(c[row]), float(rate[row]))
+        _note_missed(account, k, force, view, steps)
     return met
+
+
+def _note_missed(account: Account, k: int, stop: JointStop, view: View, steps: Array) -> None:
+    """Take note of what a stop does at rows, and of two rows between which it may be met: both are clear of it, and from
+    both it is reached at the rate there."""
+    c, rate, force = (measured_values(view, k, column) for column in (COORDINATE, RATE, FORCE))
+    account.pushed[k] = max(account.pushed.get(k, 0.0), float(np.abs(force).max()))
+    clear = stop.energy(c) == 0
+    ahead, behind = stop.energy(c[:-1] + rate[:-1] * steps[1:]), stop.energy(c[1:] - rate[1:] * steps[1:])
+    missed = clear[:-1] & clear[1:] & (rate[:-1] * rate[1:] < 0) & (ahead > 0) & (behind > 0)
+    speeds = np.where(missed, np.abs(rate[:-1]), 0.0)
+    row = int(np.argmax(speeds)) if speeds.size else 0
+    if speeds.size and speeds[row] > (account.between[k].rate if k in account.between else 0.0):
+        rows = Record(*(column[row : row + 2].copy() for column in view.record))
+        account.between[k] = Between(rows, float(speeds[row]))
+
+
+def missed_by_rows(account: Account, k: int, steps: View) -> list[str]:
+    """A note on a stop that pushes between rows as it does at none, by the steps between two of them."""
+    stop = forces_of(account.system.scene)[k]
+    most, pushed = float(np.abs(measured_values(steps, k, FORCE)).max()), account.pushed[k]
+    if not most > MISSED * pushed:
+        return []
+    of, (lasts, _) = stop.place.measured[0], _meeting(account.system, stop, account.met[k])
+    return [
+        f"{stop.name}.{of.name} is {most:.3g} {of.unit} between rows and {pushed:.3g} {of.unit} at most in them: the stop is "
+        f"met for about {lasts:.2g} s; take an output_step of {0.1 * lasts:.1g} s or less to see it"
+    ]
 
 
 def lost_rebounds(account: Account, step: float) -> list[str]:

@@ -47,6 +47,7 @@ def finished(runs: Runs, trial: Trial, path: str | Path | None, ringing: Set[str
         *unseen,
         *(_untold(runs) if trial.errors else ()),
         *_unresolved(runs, trial, ringing),
+        *result.attributes.get("missed", ()),
         *_coarse(trial),
         *_unstable(result, grown),
         *(_left(runs, trial) if trial.errors and not grown else ()),

@@ -68,6 +68,29 @@ def test_damped_stops_that_are_met_within_few_steps_are_told(stiffness, ratio, s
     assert told == pytest.approx(lasts, rel=0.25)  # more where it is soft
 
 
+@pytest.mark.parametrize("stiffness", [1e5, 1e6])
+def test_the_force_of_a_stop_that_rows_miss_is_told(stiffness):
+    """It is the rate of the approach times sqrt(J k)."""
+    method, inertia = ROS2(2e-5), 0.0838 + 0.25
+    coarse = forward(bouncing(stiffness), end=1.0, output_step=0.05, method=method, check=False)
+    assert not coarse["stop.torque"].any()
+    [note] = [note for note in coarse.attributes["notes"] if note.startswith("stop.torque is ")]
+    peak = np.sqrt(2 * 9.81 * 0.5 * np.sin(-LOWEST) / inertia) * np.sqrt(inertia * stiffness)
+    assert float(note.split()[2]) == pytest.approx(peak, rel=0.01)
+    output_step = float(note.split("an output_step of ")[1].split()[0])
+    output_step = 1.0 / np.ceil(1.0 / output_step)  # which the end is a multiple of
+    method = ROS2(output_step / np.ceil(output_step / 2e-5))
+    fine = forward(bouncing(stiffness), end=1.0, output_step=output_step, method=method, check=False)
+    assert np.abs(fine["stop.torque"]).max() == pytest.approx(peak, rel=0.03)
+    assert not any(note.startswith("stop.torque") for note in fine.attributes["notes"])
+
+
+def test_a_stop_that_is_not_met_between_coarse_rows_is_not_told():
+    """An arm that swings back before the stop, which it would reach as fast as it is at rows."""
+    swinging = forward(bouncing(1e5, lower=-np.pi - 0.05), end=4.0, output_step=0.4, method=ROS2(1e-3), check=False)
+    assert not any(note.startswith("stop.torque") for note in swinging.attributes["notes"])
+
+
 def test_a_search_takes_no_step_that_loses_rebounds():
     """However coarse the accuracy: with this stop it came to a step that throws nothing back, off by 60 %."""
     scene = bouncing(1e7, damping=2 * 0.1 * np.sqrt(1e7 * (0.0838 + 0.25)))
