@@ -26,6 +26,7 @@ from ffr_dyn.scene.forces import JointStop
 from ffr_dyn.scene.forces.force import Force
 from ffr_dyn.scene.forces.places import COORDINATE, FORCE, RATE
 from ffr_prep.common.arrays import Array
+from ffr_prep.common.errors import ComputationError
 
 AMISS = 0.1  # of the largest kinetic, strain and spring energy: from where it is told
 SURE = 3.0  # times what rows leave open of the work
@@ -160,9 +161,12 @@ def missed_by_rows(account: Account, k: int, steps: View) -> list[str]:
     if not most > MISSED * pushed:
         return []
     of, (lasts, _) = stop.place.measured[0], _meeting(account.system, stop, account.met[k])
+    known = np.isfinite(lasts)
+    met = f": the stop is met for about {lasts:.2g} s" if known else ""
+    rows = f"an output_step of {0.1 * lasts:.1g} s or less" if known else "a smaller output_step"
     return [
-        f"{stop.name}.{of.name} is {most:.3g} {of.unit} between rows and {pushed:.3g} {of.unit} at most in them: the stop is "
-        f"met for about {lasts:.2g} s; take an output_step of {0.1 * lasts:.1g} s or less to see it"
+        f"{stop.name}.{of.name} is {most:.3g} {of.unit} between rows and {pushed:.3g} {of.unit} at most in them{met}; take "
+        f"{rows} to see it"
     ]
 
 
@@ -202,15 +206,19 @@ def _meeting(system: System, stop: Force, met: Met) -> tuple[float, float]:
 
 
 def _mass_before(system: System, stop: JointStop, met: Met) -> float:
-    """[kg], [kg m^2] what moves with the joint coordinate of a stop; infinite where only bending moves it."""
+    """[kg], [kg m^2] what moves with the joint coordinate of a stop; infinite where only bending moves it, and in a position
+    that has no accelerations."""
     scene, place, time, x = system.scene, system.layout, float(met.row.time[0]), met.row.x[0]
     now = At(scene, place, time, x, np.zeros(place.v_size))
     total, ends = nothing_on(all_placed(now), place.v_size), stop.place.ends(scene)
     jets = coordinates(scene, pair(*(total.placed[number] for number in ends)), stop.place)
     gradient = total.gradient(ends, np.array([jet.first for jet in jets]))
     bending = np.vstack([np.eye(place.v_size)[place.q_dot(b)] for b in range(len(place.n))])
-    jacobian = np.vstack([evaluate(evaluator(system), time, x, now.v).jacobian, bending])
-    along = gradient @ free_motions(jacobian, total_mass_matrix(scene, place, x))
+    try:
+        jacobian = np.vstack([evaluate(evaluator(system), time, x, now.v).jacobian, bending])
+        along = gradient @ free_motions(jacobian, total_mass_matrix(scene, place, x))
+    except (ComputationError, np.linalg.LinAlgError):
+        return np.inf
     moved = float(np.sum(along**2))
     return 1 / moved if moved > 0 else np.inf
 
