@@ -962,7 +962,6 @@ CASES = (
     + scene_cases.CASES
     + analysis_cases.CASES
     + study_cases.CASES
-    + analysis_cases.BENT
 )
 
 
