@@ -10,6 +10,7 @@ from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.consistency.dropped_terms import remedy
 from ffr_dyn.consistency.following import row_named
 from ffr_dyn.equations.constraint_rows import drive_of
+from ffr_dyn.equations.inertia import kept_integrals, mass_matrix
 from ffr_dyn.integrators import RK4, ROS2, ROS3, Integrator
 from ffr_dyn.kernels.tables import (
     FAILED,
@@ -27,6 +28,7 @@ from ffr_dyn.kernels.tables import (
 )
 from ffr_dyn.scene.force_kinds import forces_of
 from ffr_dyn.scene.joints import DISTANCE
+from ffr_dyn.scene.scene import Body
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError
 
@@ -62,13 +64,7 @@ def failure(system: System, work: Work, status: int, time: float, settings: Sett
         why = locks or _overflow(system, work, settings)
         return ComputationError(f"{at} the state of {_worst(system, work)} is no longer finite: {why}")
     if status == SINGULAR_BODY:
-        body = system.scene.bodies[where]
-        where_from = f" without {', '.join(body.dropped)}" if body.dropped else ""
-        change = remedy(body) if body.dropped else "give it mass and inertia about all axes, or keep fewer modes"
-        return ComputationError(
-            f"{at} the mass matrix of body {body.name!r} is not positive{where_from}: it has no inertia left for rigid "
-            f"motion; {change}"
-        )
+        return ComputationError(f"{at} {_without_inertia(system.scene.bodies[where], settings)}")
     if status == SINGULAR_CONSTRAINT:
         block, word = row_named(system, where)
         return ComputationError(
@@ -84,6 +80,26 @@ def failure(system: System, work: Work, status: int, time: float, settings: Sett
         f"{at} the step has become too small: the motion is not smooth there (an impact, a jump of a force or of a driver), "
         f"the mechanism locks{_dead_point(system)}, or the tolerances are below what rounding allows; smooth the jump, end "
         f"the run before it, {_remedy(system, 'use larger tolerances')}"
+    )
+
+
+def _without_inertia(body: Body, settings: Settings) -> str:
+    """Of a body whose mass matrix is not positive, why and what to change."""
+    at_rest = np.linalg.eigvalsh(mass_matrix(kept_integrals(body), np.zeros(body.model.n)))
+    if at_rest.min() > 0 and not body.dropped:
+        step = settings.method is not None and not settings.method.controlled
+        change = (
+            "use a smaller step, or, if it is meant to bend so far," if step else "if it is meant to bend so far, use"
+        )
+        return (
+            f"body {body.name!r} is deformed so far that its mass matrix is no longer positive, beyond what the second order "
+            f"describes; {change} several parts of it (`ffr-prep reduce --parts`)"
+        )
+    where_from = f" without {', '.join(body.dropped)}" if body.dropped else ""
+    change = remedy(body) if body.dropped else "give it mass and inertia about all axes, or keep fewer modes"
+    return (
+        f"the mass matrix of body {body.name!r} is not positive{where_from}: it has no inertia left for rigid motion; "
+        f"{change}"
     )
 
 

@@ -962,6 +962,7 @@ CASES = (
     + scene_cases.CASES
     + analysis_cases.CASES
     + study_cases.CASES
+    + analysis_cases.BENT
 )
 
 

@@ -13,7 +13,7 @@ from unittest.mock import patch
 
 import h5py
 import numpy as np
-from ffr_gallery.bodies import bar, beam
+from ffr_gallery.bodies import bar, beam, pendulum
 from remedy import CLOUD, DOUBLE, DRIVEN, GROUND, HINGED, run
 from said import Case
 from synthetic import cloud
@@ -45,11 +45,11 @@ from ffr_dyn.consistency.assemble import assemble
 from ffr_dyn.consistency.force_jacobian import force_jacobian
 from ffr_dyn.functions.formula import formula
 from ffr_dyn.functions.time_functions import polynomial
-from ffr_dyn.integrators import RK4, ROS2, DormandPrince, HalfExplicit, tolerances
+from ffr_dyn.integrators import RK4, ROS2, ROS3, DormandPrince, HalfExplicit, tolerances
 from ffr_dyn.integrators.stabilisation import Drifting
 from ffr_dyn.results.result import Result
 from ffr_dyn.scene.drivers import Driver
-from ffr_dyn.scene.forces import JointSpring, Load
+from ffr_dyn.scene.forces import JointSpring, JointStop, Load
 from ffr_dyn.scene.joints import Joint
 from ffr_dyn.scene.scene import Body, Scene
 from ffr_dyn.variants.variant import vary
@@ -348,4 +348,13 @@ MANY = [
     Case(p(beside, paths=["a.nc"]), p(beside, paths=["a.nc", "b.nc"])),
     Case(p(beside, threads=0), p(beside, threads=1)),
 ]
+
+
+def stopped(step: float) -> Result:
+    """A soft arm that falls on a hard stop: longer steps throw it into shapes that no arm has."""
+    stop = JointStop("stop", "hinge0", stiffness=1e6, entry=1e-4, lower=-0.5)
+    return run(pendulum(beam("arm", 1.0, 1.0, 20.0, 3), forces=(stop,)), ROS3(step), 0.3)
+
+
+BENT = [Case(p(stopped, 5e-3), p(stopped, 1e-4))]
 CASES = RESUMED + KNOWN + OTHER + MANY
