@@ -10,7 +10,6 @@ from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.consistency.dropped_terms import remedy
 from ffr_dyn.consistency.following import row_named
 from ffr_dyn.equations.constraint_rows import drive_of
-from ffr_dyn.equations.inertia import kept_integrals, mass_matrix
 from ffr_dyn.integrators import RK4, ROS2, ROS3, Integrator
 from ffr_dyn.kernels.tables import (
     FAILED,
@@ -28,7 +27,6 @@ from ffr_dyn.kernels.tables import (
 )
 from ffr_dyn.scene.force_kinds import forces_of
 from ffr_dyn.scene.joints import DISTANCE
-from ffr_dyn.scene.scene import Body
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError
 
@@ -64,7 +62,13 @@ def failure(system: System, work: Work, status: int, time: float, settings: Sett
         why = locks or _overflow(system, work, settings)
         return ComputationError(f"{at} the state of {_worst(system, work)} is no longer finite: {why}")
     if status == SINGULAR_BODY:
-        return ComputationError(f"{at} {_without_inertia(system.scene.bodies[where], settings)}")
+        body = system.scene.bodies[where]
+        where_from = f" without {', '.join(body.dropped)}" if body.dropped else ""
+        change = remedy(body) if body.dropped else _less_deformed(settings)
+        return ComputationError(
+            f"{at} the mass matrix of body {body.name!r} is not positive{where_from}: as it is deformed it has no inertia "
+            f"left for rigid motion; {change}"
+        )
     if status == SINGULAR_CONSTRAINT:
         block, word = row_named(system, where)
         return ComputationError(
@@ -83,24 +87,12 @@ def failure(system: System, work: Work, status: int, time: float, settings: Sett
     )
 
 
-def _without_inertia(body: Body, settings: Settings) -> str:
-    """Of a body whose mass matrix is not positive, why and what to change."""
-    at_rest = np.linalg.eigvalsh(mass_matrix(kept_integrals(body), np.zeros(body.model.n)))
-    if at_rest.min() > 0 and not body.dropped:
-        step = settings.method is not None and not settings.method.controlled
-        change = (
-            "use a smaller step, or, if it is meant to bend so far," if step else "if it is meant to bend so far, use"
-        )
-        return (
-            f"body {body.name!r} is deformed so far that its mass matrix is no longer positive, beyond what the second order "
-            f"describes; {change} several parts of it (`ffr-prep reduce --parts`)"
-        )
-    where_from = f" without {', '.join(body.dropped)}" if body.dropped else ""
-    change = remedy(body) if body.dropped else "give it mass and inertia about all axes, or keep fewer modes"
-    return (
-        f"the mass matrix of body {body.name!r} is not positive{where_from}: it has no inertia left for rigid motion; "
-        f"{change}"
-    )
+def _less_deformed(settings: Settings) -> str:
+    """What to change where a body that can move as it was made is deformed until it has no inertia left."""
+    parts = "several parts of it (`ffr-prep reduce --parts`)"
+    if settings.method is None or settings.method.controlled:
+        return f"if it is meant to bend so far, use {parts}"
+    return f"use a smaller step, or, if it is meant to bend so far, {parts}"
 
 
 def _shrunk(system: System, row: int, time: float) -> bool:
