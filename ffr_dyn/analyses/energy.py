@@ -18,7 +18,7 @@ import numpy as np
 from ffr_dyn.compile.engine import fill_rows, new_engine
 from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.compile.workspace import new_record
-from ffr_dyn.consistency.balance import Account, add_rows, amiss, lost_rebounds, missed_by_rows
+from ffr_dyn.consistency.balance import HELD, Account, add_rows, amiss, lost_rebounds, missed_by_rows
 from ffr_dyn.consistency.evaluation import evaluator, joined, record_states
 from ffr_dyn.consistency.explicit_forces import candidates, fastest, told
 from ffr_dyn.consistency.tangent import chart, state_matrix
@@ -99,11 +99,14 @@ class EnergyWatch:
     def stops_between_rows(self) -> list[str]:
         """Notes on stops whose force rows miss."""
         found = []
-        for k, between in self.account.between.items():
-            first = _row(between.rows, 0, between.rows.energy[:, 0])
-            status, fine = self._again(first, float(between.rows.time[1]), 1)
+        for row, (begin, end, rate) in enumerate(self.account.stops["between"]):
+            if not rate > 0:
+                continue
+            x, v, forces, energy = (self.account.stops[f"between.{name}"][row] for name in HELD)
+            first = _Row(float(begin), x, v, forces, float(energy[0]), float(energy.sum()))
+            status, fine = self._again(first, float(end), 1)
             if status == OK:
-                found += missed_by_rows(self.account, k, View(self.system, fine))
+                found += missed_by_rows(self.account, row, View(self.system, fine))
         return found
 
     def look(self, view: View) -> None:

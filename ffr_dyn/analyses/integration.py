@@ -461,7 +461,8 @@ def _checkpoint(run: _Run, mark: str) -> Array:
 def _arrays(engine: Engine, energy: EnergyWatch, seen: Seen) -> dict[str, Array]:
     """All that a run changes, by name."""
     machine = {KEY + key: array for key, array in _changing(engine)}
-    return {**seen.arrays, "account": energy.account.numbers, **machine}
+    stops = {f"stops.{name}": array for name, array in energy.account.stops.items()}
+    return {**seen.arrays, "account": energy.account.numbers, **stops, **machine}
 
 
 def _changing(engine: Engine) -> Iterator[tuple[str, Array]]:

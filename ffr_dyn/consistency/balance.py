@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ffr_dyn.compile.scene_tables import System
+from ffr_dyn.compile.workspace import new_record
 from ffr_dyn.consistency.evaluation import evaluate, evaluator, free_motions, total_mass_matrix
 from ffr_dyn.equations.forces import At
 from ffr_dyn.equations.inertia import damping_matrix
@@ -34,26 +35,10 @@ QUIET = 1e-6  # m^2/s^2, twice the energy by mass that is not looked at
 # Numbers of an account [s], [J], [W]: see `Account`.
 TIME, BEGUN, WORK, OPEN, MOST, WORST, WHEN, POWER, BEFORE, TOTAL, AT_STOPS, BESIDE = range(12)
 REACHED = 2.0  # times the steps from row to row: where a stop is as near, it may be met between them
+HELD = ("x", "v", "forces", "energy")  # of a row, from which steps begin again
 RESOLVED = 4.0  # steps in the time that a stop is met for, with fewer it gives back something else
 MISSED = 2.0  # times the largest force at rows, from where on that between them is told
 REBOUND = AMISS**2  # of the largest energy, which comes back from a stop: from where on its loss is told
-
-
-@dataclass(frozen=True)
-class Met:
-    """The fastest approach to a stop: the row, as a record, with the joint coordinate and its rate."""
-
-    row: Record
-    c: float
-    rate: float
-
-
-@dataclass(frozen=True)
-class Between:
-    """Two rows, as a record, between which a stop may be met, and how fast it is approached."""
-
-    rows: Record
-    rate: float
 
 
 @dataclass(frozen=True)
@@ -64,16 +49,21 @@ class Account:
               motion and strain, largest difference between energy and work, its time, power of the last row and of the one
               before, energy of the last row
     moments : (K,) [s] at which functions of time change between rows, beside those that they break at
-    met     : by the number of a stop the fastest approach to it;  between : the fastest that rows miss
-    pushed  : by the number of a stop its largest force at a row [N]
+    stops   : of S stops "pushed" (S,) [N] the largest force at a row; "met" (S, 2) time and rate of the fastest approach and
+              "met.x" (S, X); "between" (S, 3) the times of two rows that miss it and the fastest rate there, and what the
+              first one holds, "between.x" (S, X), "between.v", "between.forces", "between.energy"
     """
 
     system: System
     moments: Array = field(default_factory=lambda: np.zeros(0))
     numbers: Array = field(default_factory=lambda: np.full(12, np.nan))
-    met: dict[int, Met] = field(default_factory=dict)
-    between: dict[int, Between] = field(default_factory=dict)
-    pushed: dict[int, float] = field(default_factory=dict)
+    stops: dict[str, Array] = field(init=False)
+
+    def __post_init__(self) -> None:
+        of, count = new_record(self.system, 1), len(_stops(self.system))
+        held = {f"between.{name}": getattr(of, name).shape[1:] for name in HELD}
+        sizes = {"pushed": (), "met": (2,), "met.x": of.x.shape[1:], "between": (3,), **held}
+        object.__setattr__(self, "stops", {name: np.zeros((count, *size)) for name, size in sizes.items()})
 
 
 def add_rows(account: Account, rows: Record, powers: Array) -> Array:
@@ -124,43 +114,47 @@ def _beside_stops(account: Account, rows: Record, steps: Array) -> Array:
     the fastest approach to every stop."""
     system = account.system
     view, met = View(system, rows), np.zeros(rows.time.size, dtype=bool)
-    for k, force in enumerate(forces_of(system.scene)):
-        if not isinstance(force, JointStop):
-            continue
+    for row, (k, stop) in enumerate(_stops(system)):
         c, rate = measured_values(view, k, COORDINATE), measured_values(view, k, RATE)
         reach = REACHED * steps * np.abs(rate)
-        near = force.energy(c - reach) + force.energy(c + reach) > 0
-        met |= near & _conserves(force)
-        row = int(np.argmax(np.where(near, np.abs(rate), 0.0)))
-        if near[row] and (k not in account.met or abs(rate[row]) > abs(account.met[k].rate)):
-            own = Record(*(column[row : row + 1].copy() for column in rows))
-            account.met[k] = Met(own, float(c[row]), float(rate[row]))
-        _note_missed(account, k, force, view, steps)
+        near = stop.energy(c - reach) + stop.energy(c + reach) > 0
+        met |= near & _conserves(stop)
+        speeds = np.where(near, np.abs(rate), 0.0)
+        at = int(np.argmax(speeds))
+        if speeds[at] > account.stops["met"][row, 1]:
+            account.stops["met"][row], account.stops["met.x"][row] = (rows.time[at], speeds[at]), rows.x[at]
+        _note_missed(account, row, rows, (c, rate, measured_values(view, k, FORCE)), steps)
     return met
 
 
-def _note_missed(account: Account, k: int, stop: JointStop, view: View, steps: Array) -> None:
-    """Take note of what a stop does at rows, and of two rows between which it may be met: both are clear of it, and from
-    both it is reached at the rate there."""
-    c, rate, force = (measured_values(view, k, column) for column in (COORDINATE, RATE, FORCE))
-    account.pushed[k] = max(account.pushed.get(k, 0.0), float(np.abs(force).max()))
+def _stops(system: System) -> list[tuple[int, JointStop]]:
+    """The stops of a scene with their numbers among its forces."""
+    return [(k, force) for k, force in enumerate(forces_of(system.scene)) if isinstance(force, JointStop)]
+
+
+def _note_missed(account: Account, row: int, rows: Record, values: tuple[Array, Array, Array], steps: Array) -> None:
+    """Take note of what stop number `row` does at rows, by its coordinate, rate and force, and of two rows between which it
+    may be met: both are clear of it, and from both it is reached at the rate there."""
+    (c, rate, force), stop, kept = values, _stops(account.system)[row][1], account.stops
+    kept["pushed"][row] = max(kept["pushed"][row], np.abs(force).max())
     clear = stop.energy(c) == 0
     ahead, behind = stop.energy(c[:-1] + rate[:-1] * steps[1:]), stop.energy(c[1:] - rate[1:] * steps[1:])
     missed = clear[:-1] & clear[1:] & (rate[:-1] * rate[1:] < 0) & (ahead > 0) & (behind > 0)
     speeds = np.where(missed, np.abs(rate[:-1]), 0.0)
-    row = int(np.argmax(speeds)) if speeds.size else 0
-    if speeds.size and speeds[row] > (account.between[k].rate if k in account.between else 0.0):
-        rows = Record(*(column[row : row + 2].copy() for column in view.record))
-        account.between[k] = Between(rows, float(speeds[row]))
+    at = int(np.argmax(speeds)) if speeds.size else 0
+    if speeds.size and speeds[at] > kept["between"][row, 2]:
+        kept["between"][row] = rows.time[at], rows.time[at + 1], speeds[at]
+        for name in HELD:
+            kept[f"between.{name}"][row] = getattr(rows, name)[at]
 
 
-def missed_by_rows(account: Account, k: int, steps: View) -> list[str]:
-    """A note on a stop that pushes between rows as it does at none, by the steps between two of them."""
-    stop = forces_of(account.system.scene)[k]
-    most, pushed = float(np.abs(measured_values(steps, k, FORCE)).max()), account.pushed[k]
+def missed_by_rows(account: Account, row: int, steps: View) -> list[str]:
+    """A note on stop number `row` if it pushes between rows as it does at none, by the steps between two of them."""
+    k, stop = _stops(account.system)[row]
+    most, pushed = float(np.abs(measured_values(steps, k, FORCE)).max()), account.stops["pushed"][row]
     if not most > MISSED * pushed:
         return []
-    of, (lasts, _) = stop.place.measured[0], _meeting(account.system, stop, account.met[k])
+    of, (lasts, _) = stop.place.measured[0], _meeting(account, row)
     known = np.isfinite(lasts)
     met = f": the stop is met for about {lasts:.2g} s" if known else ""
     rows = f"an output_step of {0.1 * lasts:.1g} s or less" if known else "a smaller output_step"
@@ -173,27 +167,28 @@ def missed_by_rows(account: Account, k: int, steps: View) -> list[str]:
 def lost_rebounds(account: Account, step: float) -> list[str]:
     """What tells that bodies come from stops with another energy than that of the scene: in runs of a fixed `step` [s] the
     stops that are met too shortly for it, and what undamped ones have lost or fed."""
-    forces, most = forces_of(account.system.scene), account.numbers[MOST]
-    found = []
-    for k, met in account.met.items():
-        lasts, returned = _meeting(account.system, forces[k], met)
+    most, found = account.numbers[MOST], []
+    for row, (_, stop) in enumerate(_stops(account.system)):
+        lasts, returned = _meeting(account, row)
         if lasts < RESOLVED * step and returned > REBOUND * most:
             found.append(
-                f"{forces[k].name!r} is met for about {lasts:.2g} s, which takes steps of {0.1 * lasts:.1g} s or less"
+                f"{stop.name!r} is met for about {lasts:.2g} s, which takes steps of {0.1 * lasts:.1g} s or less"
             )
     if not found and account.numbers[AT_STOPS] > AMISS * most and amiss(account, "", ""):
         return ["take a smaller step"]
     return found
 
 
-def _meeting(system: System, stop: Force, met: Met) -> tuple[float, float]:
-    """How long a stop is met [s], and the energy [J] that comes back, by the mass that moves with it as bodies do that do not
-    bend: half a vibration, as deep as the energy of the approach goes, which damping of a ratio zeta leaves
+def _meeting(account: Account, row: int) -> tuple[float, float]:
+    """How long stop number `row` is met [s], and the energy [J] that comes back, by the mass that moves with it as bodies do
+    that do not bend: half a vibration, as deep as the energy of the approach goes, which damping of a ratio zeta leaves
     exp(-2 pi zeta / sqrt(1 - zeta^2)) of."""
-    assert isinstance(stop, JointStop)
-    m, k = _mass_before(system, stop, met), stop.stiffness
-    energy = 0.5 * m * met.rate**2
-    if not 0 < energy < np.inf:
+    (time, rate), stop = account.stops["met"][row], _stops(account.system)[row][1]
+    if not rate > 0:
+        return np.inf, 0.0
+    m, k = _mass_before(account.system, stop, float(time), account.stops["met.x"][row]), stop.stiffness
+    energy = 0.5 * m * rate**2
+    if not energy < np.inf:
         return np.inf, 0.0
     soft = k * stop.entry**2 / 6  # stored where the full stiffness begins
     if energy < soft:
@@ -202,13 +197,13 @@ def _meeting(system: System, stop: Force, met: Met) -> tuple[float, float]:
         depth = 0.5 * (stop.entry + np.sqrt(stop.entry**2 + 8 * (energy - soft) / k))
     ratio = 0.5 * stop.damping / np.sqrt(k * m)
     returned = energy * np.exp(-2 * np.pi * ratio / np.sqrt(1 - ratio**2)) if ratio < 1 else 0.0
-    return np.pi * depth / abs(met.rate), float(returned)
+    return float(np.pi * depth / rate), float(returned)
 
 
-def _mass_before(system: System, stop: JointStop, met: Met) -> float:
+def _mass_before(system: System, stop: JointStop, time: float, x: Array) -> float:
     """[kg], [kg m^2] what moves with the joint coordinate of a stop; infinite where only bending moves it, and in a position
     that has no accelerations."""
-    scene, place, time, x = system.scene, system.layout, float(met.row.time[0]), met.row.x[0]
+    scene, place = system.scene, system.layout
     now = At(scene, place, time, x, np.zeros(place.v_size))
     total, ends = nothing_on(all_placed(now), place.v_size), stop.place.ends(scene)
     jets = coordinates(scene, pair(*(total.placed[number] for number in ends)), stop.place)

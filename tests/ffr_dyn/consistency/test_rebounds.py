@@ -91,6 +91,16 @@ def test_a_stop_that_is_not_met_between_coarse_rows_is_not_told():
     assert not any(note.startswith("stop.torque") for note in swinging.attributes["notes"])
 
 
+def test_a_run_that_goes_on_after_an_impact_tells_what_the_whole_run_does(tmp_path):
+    scene, path = bouncing(1e7, damping=100.0), tmp_path / "run.nc"
+    how = {"output_step": 0.05, "method": ROS2(1e-3), "check": False}
+    whole = forward(scene, end=1.5, **how)
+    forward(scene, end=1.0, path=path, **how)
+    going_on = forward(scene, end=1.5, resume=path, **how)
+    for key in ("rebounds", "missed", "notes"):
+        assert going_on.attributes[key] == whole.attributes[key]
+
+
 def test_a_search_takes_no_step_that_loses_rebounds():
     """However coarse the accuracy: with this stop it came to a step that throws nothing back, off by 60 %."""
     scene = bouncing(1e7, damping=2 * 0.1 * np.sqrt(1e7 * (0.0838 + 0.25)))
