@@ -142,6 +142,8 @@ def load_tables(scene: Scene, functions: FunctionTable) -> Loads:
         row=np.array(rows, dtype=np.int64).reshape(-1, 11),
         data=np.array(numbers.data, dtype=float),
         initial=np.array(initial, dtype=float),
+        kinked=np.array([k for k, force in enumerate(forces_of(scene)) for _ in force.kinks], dtype=np.int64),
+        kinks=np.array([kink for force in forces_of(scene) for kink in force.kinks], dtype=float).reshape(-1, 4),
     )
 
 

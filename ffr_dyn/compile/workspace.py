@@ -116,6 +116,7 @@ def _structure(m: Model) -> Hashable:
         m.markers.phi,
         m.functions.kind,
         m.loads.initial,
+        m.loads.kinked,
         m.pattern.sample,
     )
     arrays = b"".join(table.tobytes() for table in tables), m.rows.marker.shape, tuple(map(len, sizes))
@@ -143,7 +144,7 @@ def _blank_work(m: Model, keeps_terms: bool, keeps_passed: bool) -> Work:
         bodies=bodies,
         markers=_marker_work(m, bodies),
         rows=_row_work(m),
-        loads=_load_work(m, V),
+        loads=_load_work(m, V, m.bodies.mass.size + V),
         field=np.zeros(3),
         diagonal=np.full(1, -1.0),
         implicit=np.array([0.0, 0.0, 0.0, 1.0, 0.0]),
@@ -240,7 +241,8 @@ def _rigid_inertia(moments: bytes, mass: float, normal: int) -> tuple[Array, Arr
     return first, J, L
 
 
-def _load_work(m: Model, V: int) -> LoadWork:
+def _load_work(m: Model, V: int, X: int) -> LoadWork:
+    kinks = m.loads.kinked.size
     return LoadWork(
         reference=np.zeros(m.loads.initial.size),
         measured=np.zeros(m.loads.initial.size),
@@ -248,6 +250,7 @@ def _load_work(m: Model, V: int) -> LoadWork:
         turn=np.zeros((3, 3, 3)),
         curved=np.zeros(6),
         f=np.zeros(V),
+        **_zeros(passing=(kinks, 4), x=X * (kinks > 0), v=V * (kinks > 0)),
     )
 
 

@@ -10,6 +10,7 @@ Twin: `ffr_dyn.equations.motion.equations_of_motion`.
 from ffr_dyn.kernels.bodies import add_product, mass_times, normalise, reduce_forces
 from ffr_dyn.kernels.forces.applied import apply_loads, call_user, count_loads, gravity_field, keep_measured, power
 from ffr_dyn.kernels.forces.implicit import add_to_joints, keep_growth, set_targets, subtract_yield
+from ffr_dyn.kernels.forces.kinks import measure_kinks, step_to_kinks
 from ffr_dyn.kernels.functions import evaluate_functions, search_break
 from ffr_dyn.kernels.options import inlined
 from ffr_dyn.kernels.output_row import keep
@@ -96,6 +97,10 @@ UNMET = 1e3  # tolerances, beyond which a violation that the projection does not
 
 def has_loads(model: Model) -> bool:
     return bool(count_loads.py_func(model.loads) > 0)
+
+
+def has_kinks(model: Model) -> bool:
+    return model.loads.kinked.size > 0
 
 
 def has_dependent_rows(model: Model) -> bool:
@@ -512,6 +517,27 @@ def settle(r: Tables, t: float) -> int:
 def whole_step(r: Tables, t: float, again: int) -> int:
     """One step in as many pieces as functions of time break it into."""
     return step_in_pieces(r, step, find_break, close, settle, t, again)
+
+
+@entry_point(has_kinks)
+def measure(r: Tables, column: int) -> int:
+    """Coordinates of forces that have kinks, and their rates, of the engine's state."""
+    turn_bodies(r.model.bodies.where, r.work.bodies, r.x, r.v)
+    update_markers(r.model, r.work, IN_USE, r.x, r.v)
+    measure_kinks(r, column)
+    return OK
+
+
+@entry_point(has_kinks)
+def step_between_breaks(r: Tables, t: float, again: int) -> int:
+    """One step in as many pieces as functions of time break it into."""
+    return step_in_pieces(r, step, find_break, close, settle, t, again)
+
+
+@whole_step.where(has_kinks)
+def whole_step_to_kinks(r: Tables, t: float, again: int) -> int:
+    """One step in as many pieces as functions of time, and kinks of forces that the motion comes to, break it into."""
+    return step_to_kinks(r, step_between_breaks, measure, close, t, again)
 
 
 @entry_point()

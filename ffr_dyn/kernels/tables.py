@@ -174,6 +174,8 @@ class Loads(NamedTuple):
     row: I2  # (F, 11) see `KERNEL` and what follows it
     data: F1  # pooled numbers of places, laws and curves
     initial: F1  # (O,) what is measured, before the start: angles count their turns from there
+    kinked: I1  # (K,) the force of each kink (see `ffr_dyn.kernels.forces.kinks`)
+    kinks: F2  # (K, 4) a, b, c, d: it is where a + b coordinate + c rate + d coordinate rate is zero
 
 
 class Model(NamedTuple):
@@ -253,6 +255,9 @@ class LoadWork(NamedTuple):
     turn: F3  # (3, 3, 3) scratch of a bushing
     curved: F1  # (6,) scratch of a bushing
     f: F1  # (V,) scratch of the powers
+    passing: F2  # (K, 4) coordinate and rate at the start and the end of a step, of the force of each kink
+    x: F1  # (X,) the state at the start of that step; no numbers where no force has a kink
+    v: F1  # (V,)
 
 
 class RowWork(NamedTuple):

@@ -55,6 +55,10 @@ class LawNumbers:
     user: int = -1
 
 
+# (a, b, c, d) of where a law has a kink: a + b coordinate + c rate + d coordinate rate = 0.
+Kink = tuple[float, float, float, float]
+
+
 class Force(ABC):
     """One applied load. Kinds are final; what follows here holds unless a kind says otherwise.
 
@@ -91,6 +95,11 @@ class Force(ABC):
     @abstractmethod
     def compiled(self, table: LoadTable) -> LawNumbers:
         """The numbers of the law that the kernel reads."""
+
+    @property
+    def kinks(self) -> tuple[Kink, ...]:
+        """Where the law has a kink, of a force on one coordinate; steps of a fixed length end there."""
+        return ()
 
     @property
     def stiff_coordinates(self) -> tuple[int, ...]:

@@ -11,10 +11,12 @@ import numpy as np
 from ffr_dyn.scene.fields import COORDINATE, DAMPING, STIFFNESS, In
 from ffr_dyn.scene.force_kinds import register_force
 from ffr_dyn.scene.forces.checks import check_number, check_positive
-from ffr_dyn.scene.forces.force import Force, LawNumbers, LoadTable, Moment
+from ffr_dyn.scene.forces.force import Force, Kink, LawNumbers, LoadTable, Moment
 from ffr_dyn.scene.forces.places import OnJoint
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
+
+ENTRY_STEPS = 8  # at least, in which a stop is entered
 
 
 @register_force
@@ -89,6 +91,30 @@ class JointStop(Force):
         beyond = np.maximum(depth - self.entry, 0.0)
         found: Array = self.stiffness * (entered**3 / (6 * self.entry) + 0.5 * beyond * (beyond + self.entry))
         return found
+
+    @property
+    def kinks(self) -> tuple[Kink, ...]:
+        """Where a stop is met and where it is entered, and where damping would begin to pull, beyond that and before.
+
+        Between the first two are more places, so that steps that are longer than the entry see how the force grows in it.
+        """
+        found = list[Kink]()
+        for end, out in ((self.lower, -1.0), (self.upper, 1.0)):
+            if end is None:
+                continue
+            depths = np.linspace(0.0, self.entry, 1 + ENTRY_STEPS).tolist()
+            found += [(-end - out * depth, 1.0, 0.0, 0.0) for depth in depths]
+            if self.damping > 0:
+                found += [self._pulls(end, out), self._pulls_in_entry(end, out)]
+        return tuple(found)
+
+    def _pulls(self, end: float, out: float) -> Kink:
+        """stiffness (depth - entry / 2) + damping speed = 0"""
+        return -end - out * self.entry / 2, 1.0, self.damping / self.stiffness, 0.0
+
+    def _pulls_in_entry(self, end: float, out: float) -> Kink:
+        """stiffness entry / 2 + damping speed (3 - 2 depth / entry) = 0, times entry / (2 damping)"""
+        return self.stiffness * self.entry**2 / (4 * self.damping), 0.0, 1.5 * out * self.entry + end, -1.0
 
     @property
     def stiff_coordinates(self) -> tuple[int, ...]:

@@ -93,7 +93,7 @@ def test_a_stop_that_is_not_met_between_coarse_rows_is_not_told():
 
 def test_a_run_that_goes_on_after_an_impact_tells_what_the_whole_run_does(tmp_path):
     scene, path = bouncing(1e7, damping=100.0), tmp_path / "run.nc"
-    how = {"output_step": 0.05, "method": ROS2(1e-3), "check": False}
+    how = {"output_step": 0.05, "method": ROS2(2e-4), "check": False}
     whole = forward(scene, end=1.5, **how)
     forward(scene, end=1.0, path=path, **how)
     going_on = forward(scene, end=1.5, resume=path, **how)

@@ -1,0 +1,113 @@
+"""Steps end where a stop is met, entered and left, so that methods keep their order and two runs tell an error."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
+
+from ffr_dyn.analyses.forward import forward
+from ffr_dyn.integrators import RK4, ROS2, ROS3, GeneralisedAlpha, HalfExplicit
+from ffr_dyn.scene.forces import JointStop
+from ffr_dyn.scene.joints import Joint
+from ffr_dyn.scene.scene import Body, Scene
+from ffr_prep.body import rigid_body
+
+END, ROW = 0.1, 0.01
+BLOCK = rigid_body("block", mass=1.0, inertia=(1.0, 1.0, 1.0), points={"c": (0, 0, 0)})
+# Stiffness, entry, damping, speed: the first entry is crossed in 1e-5 s.
+STOPS = {
+    "short entry": (1e6, 1e-5, 20.0, 1.0),
+    "undamped": (4e5, 4e-6, 0.0, 1.0),
+    "damped": (1e5, 2e-5, 120.0, 3.0),
+    "long entry": (2e4, 8e-4, 60.0, 1.0),
+}
+
+
+def stop(stiffness, entry, damping):
+    ends = {"lower": -0.01, "upper": 0.01}
+    return JointStop("stop", "guide", stiffness=stiffness, entry=entry, damping=damping, coordinate="stroke", **ends)
+
+
+def between_stops(stiffness, entry, damping, speed):
+    """A mass of 1 kg that slides without friction."""
+    guide = Joint("guide", "translational", "ground.o", "block.c", axis=(1, 0, 0))
+    body = Body("block", BLOCK, velocity=(speed, 0, 0))
+    return Scene((body,), (guide,), forces=(stop(stiffness, entry, damping),), ground={"o": (0, 0, 0)})
+
+
+@cache
+def true(name):
+    """(T,) strokes, by another solver, whose steps no kink misleads: they are as fine as they must be."""
+    stiffness, entry, damping, speed = STOPS[name]
+    law = stop(stiffness, entry, damping).law
+
+    def rates(t, y):
+        return [y[1], law(None, y[0], y[1])]
+
+    times = np.linspace(0, END, 1 + round(END / ROW))
+    return solve_ivp(rates, (0, END), [0, speed], t_eval=times, rtol=1e-11, atol=1e-14, max_step=1e-4).y[0]
+
+
+def kink_of(kink, rate):
+    """The coordinate of a kink at a rate; none of a kink that no coordinate comes to."""
+    a, b, c, d = kink
+    return -(a + c * rate) / (b + d * rate) if b + d * rate else np.nan
+
+
+@pytest.mark.parametrize("rate", [-1.0, -0.05, 0.0, 0.05, 1.0])
+@pytest.mark.parametrize("numbers", [(1e5, 1e-4, 0.0), (1e5, 1e-4, 20.0), (1e5, 1e-2, 400.0)])
+def test_the_kinks_of_a_stop_are_those_of_its_law(numbers, rate):
+    """Where it is met, where it is entered, and from where on damping would pull."""
+    force = stop(*numbers)
+    told = np.array([kink_of(kink, rate) for kink in force.kinks])
+    told = told[np.isfinite(told)]
+    for end, out in ((-0.01, -1.0), (0.01, 1.0)):
+        places = [end, end + out * force.entry]
+        if force.damping and rate * out < 0:  # on its way out, where it would pull from a depth on
+
+            def raw(depth, rate=rate, out=out):
+                share = min(depth / force.entry, 1.0)
+                elastic = depth - force.entry * share * (1 - share / 2)
+                return force.stiffness * elastic + force.damping * rate * out * share**2 * (3 - 2 * share)
+
+            deepest = force.entry + abs(rate) * force.damping / force.stiffness
+            if raw(1e-6 * force.entry) < 0:
+                places.append(end + out * brentq(raw, 1e-6 * force.entry, deepest))
+        for place in places:
+            assert np.abs(told - place).min() < 1e-9
+
+
+@pytest.mark.parametrize("name", STOPS)
+def test_errors_of_impacts_are_told(name):
+    """Of an entry that is crossed within a step, two runs agreed or not by chance: the first was off by 15 times what was
+    told."""
+    for how in ({}, {"method": ROS2(5e-5), "check": True}, {"method": RK4(1e-4), "check": True}):
+        result = forward(between_stops(*STOPS[name]), end=END, output_step=ROW, **how)
+        error = np.abs(result["block.c.position"][:, 0] - true(name)).max()
+        assert 0.3 < result.attributes["errors"]["block.c.position"][0] / error < 8
+
+
+@pytest.mark.parametrize(("method", "order"), [(ROS2, 2), (ROS3, 3), (HalfExplicit, 4), (GeneralisedAlpha, 2)])
+def test_a_method_keeps_its_order_over_an_impact(method, order):
+    """Wherever within a step the stop is met and left; with steps over both the error came and went by chance."""
+    scene = between_stops(1e5, 1e-6, 0.0, 1.0)
+
+    def ends(method):
+        return forward(scene, end=0.024, output_step=0.024, method=method, check=False)["block.c.position"][-1, 0]
+
+    counts = np.array([100, 127, 160, 200, 252])
+    errors = np.abs([ends(method(0.024 / count)) for count in counts] - ends(RK4(1e-6)))
+    assert -np.polyfit(np.log(counts), np.log(errors), 1)[0] == pytest.approx(order, abs=0.1)
+    np.testing.assert_allclose(errors * counts**order, errors[0] * counts[0] ** order, rtol=0.1)
+
+
+def test_steps_are_no_shorter_where_nothing_is_met():
+    scene = between_stops(1e6, 1e-5, 20.0, 1.0)
+    before = forward(scene, end=0.009, output_step=0.001, method=ROS2(1e-4), check=False)
+    beyond = forward(scene, end=0.012, output_step=0.001, method=ROS2(1e-4), check=False)
+    assert before.attributes["evaluations"] < 2.3 * 90 + 10
+    assert beyond.attributes["evaluations"] > before.attributes["evaluations"] + 2 * 30
