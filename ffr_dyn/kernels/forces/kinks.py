@@ -1,10 +1,10 @@
 """Steps that end where the motion comes to a kink of a force, as where a stop is met, fully entered, or left.
 
 A step over a kink errs by where within it the kink lies, which is chance: whatever the order of the method, two steps agree
-or not by accident, and what they differ by tells little of what they err by. So a step that has passed a kink is done again in
-pieces, the first of which ends there. The cubic through coordinates and rates at both ends of the step tells where. A piece
-that passes the kink by more than a small part of a step is done again, shorter; after one that ends before it the next looks
-again.
+or not by accident, and what they differ by tells little of what they err by. So a step that has passed a kink is done again
+in pieces, the first of which ends there. The cubic through coordinates and rates at both ends of the step tells where. A
+piece that passes the kink by more than a small part of a step is done again, shorter; after one that ends before it the next
+looks again.
 
 A kink is where  a + b x + c x_dot + d x x_dot  changes its sign; x is the coordinate of the force.
 
