@@ -59,6 +59,8 @@ def finished(runs: Runs, trial: Trial, path: str | Path | None, ringing: Set[str
     if trial.errors:
         more["accuracy"] = _at_least(trial.errors) if unseen else worst(trial.errors)
         more["effort"] = sum(runs.work) / max(1, result.attributes["evaluations"])
+    elif result.time.size > 1:
+        more["accuracy"] = "step: not known"
     attributes = {**result.attributes, **more}
     if path is not None:
         with_attributes(path, attributes)
@@ -74,7 +76,10 @@ def _at_least(errors: Mapping[str, StepError]) -> str:
 def _unseen(trial: Trial) -> list[str]:
     """A note where what the steps damp, or what stops give back, is not in the errors."""
     if not trial.errors:
-        return []
+        nothing = (
+            "the runs that would tell the error of the steps have failed, or have no two rows in common with this one"
+        )
+        return [f"{nothing}; take a smaller step"] if trial.result.time.size > 1 else []
     if "rebounds" in trial.result.attributes:
         lost = trial.result.attributes["rebounds"]
         return [f"the error told leaves out rebounds from stops, for which the steps are too long: {lost}"]

@@ -13,6 +13,7 @@ from ffr_dyn.analyses.events import Event
 from ffr_dyn.analyses.forward import forward
 from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.analyses.registry import summary
+from ffr_dyn.analyses.trials.runs import Runs
 from ffr_dyn.consistency.step_error import largest_difference, of_the_range, ranges
 from ffr_dyn.functions.formula import formula
 from ffr_dyn.integrators import RK4, ROS2, ROS3, AdaptiveROS3, Within, stepped, tolerances
@@ -244,3 +245,18 @@ def test_a_step_that_cannot_be_found_is_the_failure_of_the_run():
     scene = replace(driven(), loads=(Load("push", "rod.b", force=(formula("sqrt(0.3 - t)"), 0.0, 0.0)),))
     with pytest.raises(ComputationError, match=r"t = 0\.3"):
         forward(scene, **SPAN)
+
+
+def test_an_error_that_no_run_tells_is_told_to_be_unknown(monkeypatch):
+    """As of iterations that converge with one step and with no other."""
+    only, run = ROS2(1e-3), Runs.run
+
+    def failing(self, method, **more):
+        if method != only:
+            raise ComputationError("does not converge")
+        return run(self, method, **more)
+
+    monkeypatch.setattr(Runs, "run", failing)
+    result = forward(swinging(0.0), **SPAN, method=only, check=True)
+    assert result.attributes["accuracy"] == "step: not known"
+    assert any("runs that would tell the error of the steps have failed" in note for note in result.attributes["notes"])
