@@ -51,7 +51,8 @@ class Account:
     moments : (K,) [s] at which functions of time change between rows, beside those that they break at
     stops   : of S stops "pushed" (S,) [N] the largest force at a row; "met" (S, 2) time and rate of the fastest approach and
               "met.x" (S, X); "between" (S, 3) the times of two rows that miss it and the fastest rate there, and what the
-              first one holds, "between.x" (S, X), "between.v", "between.forces", "between.energy"
+              first one holds, "between.x" (S, X), "between.v", "between.forces", "between.energy"; "last" (S, 2) coordinate
+              and rate at the last row, and what that holds, "last.x" (S, X), "last.v", "last.forces", "last.energy"
     """
 
     system: System
@@ -61,8 +62,8 @@ class Account:
 
     def __post_init__(self) -> None:
         of, count = new_record(self.system, 1), len(_stops(self.system))
-        held = {f"between.{name}": getattr(of, name).shape[1:] for name in HELD}
-        sizes = {"pushed": (), "met": (2,), "met.x": of.x.shape[1:], "between": (3,), **held}
+        held = {f"{row}.{name}": getattr(of, name).shape[1:] for row in ("between", "last") for name in HELD}
+        sizes = {"pushed": (), "met": (2,), "met.x": of.x.shape[1:], "between": (3,), "last": (2,), **held}
         object.__setattr__(self, "stops", {name: np.zeros((count, *size)) for name, size in sizes.items()})
 
 
@@ -137,15 +138,20 @@ def _note_missed(account: Account, row: int, rows: Record, values: tuple[Array, 
     may be met: both are clear of it, and from both it is reached at the rate there."""
     (c, rate, force), stop, kept = values, _stops(account.system)[row][1], account.stops
     kept["pushed"][row] = max(kept["pushed"][row], np.abs(force).max())
+    c, rate = (np.append(last, new) for last, new in zip(kept["last"][row], (c, rate), strict=True))
     clear = stop.energy(c) == 0
-    ahead, behind = stop.energy(c[:-1] + rate[:-1] * steps[1:]), stop.energy(c[1:] - rate[1:] * steps[1:])
+    ahead, behind = stop.energy(c[:-1] + rate[:-1] * steps), stop.energy(c[1:] - rate[1:] * steps)
     missed = clear[:-1] & clear[1:] & (rate[:-1] * rate[1:] < 0) & (ahead > 0) & (behind > 0)
     speeds = np.where(missed, np.abs(rate[:-1]), 0.0)
-    at = int(np.argmax(speeds)) if speeds.size else 0
-    if speeds.size and speeds[at] > kept["between"][row, 2]:
-        kept["between"][row] = rows.time[at], rows.time[at + 1], speeds[at]
+    at = int(np.argmax(speeds))
+    if speeds[at] > kept["between"][row, 2]:
+        before = account.numbers[TIME] if at == 0 else rows.time[at - 1]
+        kept["between"][row] = before, rows.time[at], speeds[at]
         for name in HELD:
-            kept[f"between.{name}"][row] = getattr(rows, name)[at]
+            kept[f"between.{name}"][row] = kept[f"last.{name}"][row] if at == 0 else getattr(rows, name)[at - 1]
+    kept["last"][row] = c[-1], rate[-1]
+    for name in HELD:
+        kept[f"last.{name}"][row] = getattr(rows, name)[-1]
 
 
 def missed_by_rows(account: Account, row: int, steps: View) -> list[str]:

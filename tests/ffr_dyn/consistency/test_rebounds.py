@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from ffr_dyn.analyses import integration
 from ffr_dyn.analyses.forward import forward
 from ffr_dyn.analyses.run import run
 from ffr_dyn.economy.outputs import Output
@@ -83,6 +84,15 @@ def test_the_force_of_a_stop_that_rows_miss_is_told(stiffness):
     fine = forward(bouncing(stiffness), end=1.0, output_step=output_step, method=method, check=False)
     assert np.abs(fine["stop.torque"]).max() == pytest.approx(peak, rel=0.03)
     assert not any(note.startswith("stop.torque") for note in fine.attributes["notes"])
+
+
+def test_how_many_rows_are_computed_at_once_changes_no_note(monkeypatch):
+    """It depends on how fast the machine is."""
+    how = {"end": 1.0, "output_step": 0.05, "method": ROS2(2e-5), "check": False}
+    at_once = forward(bouncing(1e6), **how).attributes["notes"]
+    monkeypatch.setattr(integration, "SECONDS_PER_CALL", 1e-9)
+    assert forward(bouncing(1e6), **how).attributes["notes"] == at_once
+    assert any(note.startswith("stop.torque is ") for note in at_once)
 
 
 def test_a_stop_that_is_not_met_between_coarse_rows_is_not_told():
