@@ -615,7 +615,7 @@ def test_options_go_before_the_chart_of_the_file(scene_file, tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ("[0.00625]", "[-1]", r"chart\.methods\.rk4\.0: Input should be greater than 0 \(it is -1\)"),
+        ("[0.00625]", "[-1]", r"chart\.methods\.rk4\.1: must be greater than 0 \(it is -1\)"),
         ("rk4", "rk5", r"chart\.methods.*'rk4'"),
         ("[2,", "[-2,", r"chart\.modes.*greater than or equal to 0"),
         ("I9", "I7", r"chart\.drop.*'I9'"),
