@@ -18,7 +18,7 @@ from ffr_dyn.analyses.outcome import result_of, turned_along
 from ffr_dyn.analyses.registry import OfMoment
 from ffr_dyn.analyses.settings import MomentSettings
 from ffr_dyn.analyses.states import held
-from ffr_dyn.consistency.assemble import Assembled, assemble, in_space
+from ffr_dyn.consistency.assemble import Assembled, assemble, seen_in_space
 from ffr_dyn.consistency.doubts import checked
 from ffr_dyn.consistency.equilibrium import Equilibrium, equilibrium, jumped
 from ffr_dyn.consistency.evaluation import (
@@ -72,7 +72,7 @@ def static(
 
     >>> result = fd.static(scene)
     """
-    assembled = assemble(in_space(held(scene, time)), time=time)
+    assembled = assemble(seen_in_space(held(scene, time)), time=time)
     selected(assembled.system, outputs)
     at = evaluator(assembled.system)
     found = equilibrium(assembled.system, time, assembled.x, sizes(at))

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ffr_dyn.closing.independence import redundant_drivers
-from ffr_dyn.consistency.assemble import assemble, flat_form, flattened, in_space
+from ffr_dyn.consistency.assemble import assemble, flat_form, flattened, seen_in_space
 from ffr_dyn.consistency.evaluation import free_motions, locked, total_mass_matrix, unit_rows
 from ffr_dyn.equations.constraint_rows import Block, rows_at
 from ffr_dyn.equations.constraints import evaluate_word
@@ -88,7 +88,7 @@ def mobility(scene: Scene, *, time: float = 0.0, drivers: bool = True) -> Mobili
 
     >>> print(fd.mobility(scene))
     """
-    whole, scene = flat_form(scene, time), in_space(scene)
+    whole, scene = flat_form(scene, time), seen_in_space(scene)
     over = overdriven(scene, time) if drivers and scene.drivers else ()
     bare = scene if drivers and not over else replace(scene, drivers=())
     assembled = assemble(bare, time=time)
@@ -107,7 +107,7 @@ def mobility(scene: Scene, *, time: float = 0.0, drivers: bool = True) -> Mobili
 
 def overdriven(scene: Scene, time: float = 0.0) -> tuple[str, ...]:
     """Drivers that prescribe what the joints and the other drivers fix already, seen from the start without them."""
-    flat = flat_form(in_space(scene), time)
+    flat = flat_form(seen_in_space(scene), time)
     assembled = assemble(replace(flat.scene, drivers=()), time=time)
     return redundant_drivers(flat.rows, assembled.x, assembled.v)
 

@@ -133,9 +133,7 @@ def load_study(path: str | Path) -> Study:
         first = min(error.errors(), key=lambda one: one["type"] != "extra_forbidden")
         where = ".".join(entry_keys(first, tree))
         hint = f"; {_hint(where)}" if first["type"] == "extra_forbidden" else f" (it is {first['input']!r})"
-        raise InputError(
-            f"{path}: {where}: {complaint(first)}{hint if first['type'] != 'missing' else ''}"
-        ) from None
+        raise InputError(f"{path}: {where}: {complaint(first)}{hint if first['type'] != 'missing' else ''}") from None
     try:
         return study(
             path.parent / entry.scene, entry.parameters, entry.outputs, bodies={k: b.make for k, b in entry.bodies.items()},

@@ -243,7 +243,10 @@ def test_ties_that_cannot_be(tmp_path, old, new, says):
         ("name = ", "is not a readable TOML"),
         (LINE.replace('"circle"', '"round"'), "members.bar.section: .*'round'"),
         (LINE.replace("d = 0.01", "d = nan"), "members.bar.section.d: must be a finite number"),
-        (LINE.replace("d = 0.01", "d = '10 mm'"), r"d: must be a number \(it is '10 mm'\); write it without a unit, in SI"),
+        (
+            LINE.replace("d = 0.01", "d = '10 mm'"),
+            r"d: must be a number \(it is '10 mm'\); write it without a unit, in SI",
+        ),
         (LINE.replace(", d = 0.01", ""), "members.bar.section.d: is required, and missing"),
         (LINE.replace("elements = 2", "elements = 2.5"), r"polylines.1.elements: must be a whole number \(it is 2.5\)"),
         (LINE.replace("d = 0.01", "d = -0.01"), "bar.toml: section circle -0.01 m: d is -0.01 m"),
