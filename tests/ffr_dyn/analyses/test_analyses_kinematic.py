@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 from synthetic import cloud
 
+import ffr_prep as fp
 from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.analyses.kinematic import kinematic
+from ffr_dyn.analyses.static import static
 from ffr_dyn.consistency.mobility import mobility
 from ffr_dyn.functions.time_functions import polynomial, table
 from ffr_dyn.integrators import RK4
@@ -94,6 +96,28 @@ def test_mobility_in_words():
     assert any("main.angle" in line for line in free.lines())
     driven = mobility(slider_crank(0.2, 0.7, MOTOR))
     assert (driven.degrees_of_freedom, driven.free, driven.overdriven) == (0, (), ())
+
+
+def test_a_flexible_rod_takes_nothing_from_the_freedom_of_the_crank():
+    """Its hinges bend it in three ways across the plane; the crank turns all the same, and nothing holds it at rest."""
+    line = fp.polyline(
+        [(0, 0, 0), (0.7, 0, 0)], fp.Member(fp.rectangle(0.02, 0.01), fp.material("steel"), (0, 1, 0)), elements=4
+    )
+    ends = [fp.InterfaceRegion("a"), fp.InterfaceRegion("b")]
+    request = fp.Request(name="rod", reference=fp.SimplySupported("a", "b"), reduction=fp.CraigBampton(2), linear=True)
+    rod = fp.reduce(fp.from_frame(fp.named(line, a=(0, 0, 0), b=(0.7, 0, 0)), ends), request)
+    scene = replace(slider_crank(0.2, 0.7), gravity=(0, 0, 0))
+    hinges = (Joint("pin", "revolute", "crank.b", "rod.a"), Joint("wrist", "revolute", "slider.c", "rod.b"))
+    drawn = scene.bodies[1]
+    bodies = (scene.bodies[0], Body("rod", rod, position=drawn.position, rotation=drawn.rotation), scene.bodies[2])
+    scene = replace(scene, bodies=bodies, joints=(scene.joints[0], *hinges, scene.joints[3]))
+    free, driven = mobility(scene), mobility(replace(scene, drivers=(MOTOR,)))
+    assert (free.rigid, free.degrees_of_freedom, free.elastic) == (1, rod.n - 2, rod.n)
+    assert free.lines()[0].startswith("1 rigid degree of freedom; ")
+    assert free.lines()[0].endswith("which joints and drivers deform in 3 ways")
+    assert (driven.rigid, driven.degrees_of_freedom) == (0, rod.n - 3)
+    with pytest.raises(InputError, match=r"nothing holds the motion .* \(1 rigid degree of freedom"):
+        static(scene)
 
 
 def test_mobility_of_a_free_flexible_body():
