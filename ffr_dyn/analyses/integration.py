@@ -192,7 +192,7 @@ def check_method(method: object) -> None:
 def _counts(span: float, output_step: float, step: float) -> tuple[int, int]:
     """(steps per output row, output rows)."""
     if not 0 < span < np.inf:
-        raise InputError(f"the duration, from start to end, is {span} s; it must be positive and finite")
+        raise InputError(f"the duration, from start to end, is {span:.6g} s; it must be positive and finite")
     substeps, rows = round(output_step / step), round(span / output_step)
     if substeps < 1 or abs(substeps * step - output_step) > 1e-9 * output_step:
         better = output_step / max(1, round(output_step / step))
@@ -200,7 +200,11 @@ def _counts(span: float, output_step: float, step: float) -> tuple[int, int]:
             f"the output step {output_step} s is not a multiple of the step {step} s; try a step of {better:.6g}"
         )
     if rows < 1 or abs(rows * output_step - span) > 1e-9 * span:
-        raise InputError(f"the duration {span} s is not a multiple of the output step {output_step} s")
+        whole = max(1, rows)
+        raise InputError(
+            f"the duration {span:.6g} s is not a multiple of the output step {output_step:.6g} s; try an output step of "
+            f"{span / whole:.6g}, or let it last {whole * output_step:.6g} s"
+        )
     if rows > _MOST_ROWS:
         raise InputError(
             f"an output step of {output_step:g} s makes {float(rows):.2g} rows of {span:g} s, which no disk holds; give a "

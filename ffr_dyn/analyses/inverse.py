@@ -14,14 +14,14 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from ffr_dyn.analyses.forward import forward
-from ffr_dyn.analyses.kinematic import Followed, along_the_path, undeformed
+from ffr_dyn.analyses.kinematic import Followed, along_the_path
 from ffr_dyn.analyses.outcome import efforts, efforts_told, needed, only, result_of, with_quantities
 from ffr_dyn.analyses.registry import OverTime, option
 from ffr_dyn.analyses.settings import Settings
 from ffr_dyn.consistency.assemble import Assembled, assemble, flattened
 from ffr_dyn.consistency.doubts import checked
 from ffr_dyn.consistency.evaluation import Evaluator, copied, evaluate, evaluator, joined, locked
-from ffr_dyn.consistency.mobility import require_driven
+from ffr_dyn.consistency.mobility import require_driven, undeformed
 from ffr_dyn.equations.layout import moved, to_global_axes
 from ffr_dyn.integrators import Integrator, Within
 from ffr_dyn.integrators.stabilisation import Projection, Stabilisation

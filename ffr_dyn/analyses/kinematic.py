@@ -26,15 +26,14 @@ from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.consistency import doubts
 from ffr_dyn.consistency.assemble import Assembled, assemble
 from ffr_dyn.consistency.evaluation import Evaluation, Evaluator, copied, evaluate, evaluator, joined, total_mass_matrix
-from ffr_dyn.consistency.mobility import named_motion, require_driven
+from ffr_dyn.consistency.mobility import named_motion, require_driven, undeformed
 from ffr_dyn.equations.constraint_rows import blocks_of, rows_at
 from ffr_dyn.equations.layout import moved, to_body_axes, to_global_axes
 from ffr_dyn.kernels.tables import EVALUATIONS, Record
 from ffr_dyn.results.quantities import selected
 from ffr_dyn.results.result import Result
 from ffr_dyn.scene.described import described
-from ffr_dyn.scene.scene import Body, Scene, require_scene
-from ffr_prep.body import truncated
+from ffr_dyn.scene.scene import Scene
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError
 
@@ -145,16 +144,6 @@ def along_the_path(
     notes = [*assembled.notes, *_undeformed_notes(scene)]
     notes += doubts.checked("kinematic", assembled, record, {doubts.SINGULAR: _singular_notes(at.system, followed)})
     return Followed(assembled, record, angles, notes, int(at.work.info[EVALUATIONS]))
-
-
-def undeformed(scene: Scene) -> Scene:
-    """The scene with rigid bodies of the same inertia and interfaces."""
-    require_scene(scene)
-    return replace(scene, bodies=tuple(_rigid(body) if body.model.n else body for body in scene.bodies))
-
-
-def _rigid(body: Body) -> Body:
-    return replace(body, model=truncated(body.model, 0), q=None, q_dot=None, damping=0.0, stiffening=False, frame=None)
 
 
 def _undeformed_notes(scene: Scene) -> list[str]:

@@ -23,7 +23,7 @@ from ffr_dyn.analyses.settings import MomentSettings
 from ffr_dyn.analyses.states import scene_at
 from ffr_dyn.analyses.static import static
 from ffr_dyn.compile.engine import with_model
-from ffr_dyn.consistency.assemble import assemble, in_space
+from ffr_dyn.consistency.assemble import assemble, seen_in_space
 from ffr_dyn.consistency.doubts import checked
 from ffr_dyn.consistency.evaluation import Evaluator, evaluate, evaluator
 from ffr_dyn.consistency.tangent import Chart, at_rest, chart, derivative, rates, sizes, state, state_matrix
@@ -213,7 +213,7 @@ def linearised(
 ) -> Linearisation:
     """As `linearise`, whatever turns."""
     several("inputs", inputs, (*get_args(Effort), str)), several("outputs", outputs, (str,))
-    fed = with_units(in_space(scene), _efforts(inputs))
+    fed = with_units(seen_in_space(scene), _efforts(inputs))
     assembled = assemble(fed, time=time)
     at = _with_inputs(evaluator(assembled.system), scene, inputs, np.zeros(len(inputs)))
     near = chart(at, time, assembled.x, assembled.v)

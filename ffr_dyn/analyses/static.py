@@ -18,7 +18,7 @@ from ffr_dyn.analyses.outcome import result_of, turned_along
 from ffr_dyn.analyses.registry import OfMoment
 from ffr_dyn.analyses.settings import MomentSettings
 from ffr_dyn.analyses.states import held
-from ffr_dyn.consistency.assemble import Assembled, assemble, in_space
+from ffr_dyn.consistency.assemble import Assembled, assemble, seen_in_space
 from ffr_dyn.consistency.doubts import checked
 from ffr_dyn.consistency.equilibrium import Equilibrium, equilibrium, jumped
 from ffr_dyn.consistency.evaluation import (
@@ -31,7 +31,7 @@ from ffr_dyn.consistency.evaluation import (
     record_states,
     total_mass_matrix,
 )
-from ffr_dyn.consistency.mobility import counted, named_motion
+from ffr_dyn.consistency.mobility import counted, named_motion, rigid_freedom
 from ffr_dyn.consistency.tangent import sizes
 from ffr_dyn.kernels.tables import EVALUATIONS
 from ffr_dyn.results.quantities import selected
@@ -72,16 +72,16 @@ def static(
 
     >>> result = fd.static(scene)
     """
-    assembled = assemble(in_space(held(scene, time)), time=time)
+    assembled = assemble(seen_in_space(held(scene, time)), time=time)
     selected(assembled.system, outputs)
     at = evaluator(assembled.system)
     found = equilibrium(assembled.system, time, assembled.x, sizes(at))
-    lowest, flutter = _lowest_stiffness(at, assembled, found)
+    lowest, flutter = _lowest_stiffness(at, assembled, found, time)
     branch = jumped(assembled.system, time, assembled.x, sizes(at), found)
     return _result(scene, assembled, at, found, time, (lowest, flutter, branch), outputs, path)
 
 
-def _lowest_stiffness(at: Evaluator, assembled: Assembled, found: Equilibrium) -> tuple[float, float]:
+def _lowest_stiffness(at: Evaluator, assembled: Assembled, found: Equilibrium, time: float) -> tuple[float, float]:
     """[1/s^2] per mass, of the free motions; infinite where there is none; and the frequency [Hz] of flutter, or zero.
 
     InputError for a motion that nothing holds.
@@ -100,9 +100,8 @@ def _lowest_stiffness(at: Evaluator, assembled: Assembled, found: Equilibrium) -
             f"a pole near there, along {motion}; look at the forces and formulas that act on it, or start nearer to an "
             "equilibrium"
         )
-    rigid = assembled.degrees_of_freedom > sum(at.system.layout.n)
-    if not found.found and rigid:
-        raise _not_held(assembled, x, Z @ vectors[:, 0], f"no equilibrium was found in {len(found.steps)} steps")
+    if not found.found and rigid_freedom(assembled.system.scene, assembled, time):
+        raise _not_held(assembled, time, x, Z @ vectors[:, 0], f"no equilibrium was found in {len(found.steps)} steps")
     if not found.found:
         motion = named_motion(at.system.scene, at.system.layout, x, Z @ vectors[:, 0])
         raise ComputationError(
@@ -115,7 +114,7 @@ def _lowest_stiffness(at: Evaluator, assembled: Assembled, found: Equilibrium) -
         values, vectors = np.linalg.eig(K)  # the symmetric part says nothing then, of what holds and of stability
     loose = int(np.argmin(np.abs(values)))
     if abs(values[loose]) <= limit:
-        raise _not_held(assembled, x, Z @ vectors[:, loose].real, "the equilibrium is not determined")
+        raise _not_held(assembled, time, x, Z @ vectors[:, loose].real, "the equilibrium is not determined")
     return (float(values[0]), 0.0) if symmetric else _with_flutter(values)
 
 
@@ -130,12 +129,14 @@ def _with_flutter(values: Array) -> tuple[float, float]:
     return float(values.real.min()), float(frequencies.min()) if met.size else 0.0
 
 
-def _not_held(assembled: Assembled, x: Array, direction: Array, what: str) -> InputError:
+def _not_held(assembled: Assembled, time: float, x: Array, direction: Array, what: str) -> InputError:
     system = assembled.system
     motion = named_motion(system.scene, system.layout, x, direction)
+    rigid = rigid_freedom(system.scene, assembled, time)
+    counts = counted(assembled.degrees_of_freedom, rigid, sum(system.layout.n), len(assembled.redundant))
     return InputError(
         f"{what}: nothing holds the motion {motion}; add a joint, a driver or a spring that does, or start nearer to an "
-        f"equilibrium ({counted(assembled.degrees_of_freedom, sum(system.layout.n), len(assembled.redundant))})"
+        f"equilibrium ({counts})"
     )
 
 

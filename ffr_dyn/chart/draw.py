@@ -30,6 +30,7 @@ MARKERS = "os^Dv<>PXh*p"
 COLOURS = (*PALETTE, "#7B3294", "#8C510A", "#808080", "#A6D96A", "#B2182B")  # as many methods are told apart
 FRONT, FLOOR = "#222222", "#888888"
 FEW = (1.0, 0.3)  # decades of an axis, over which powers of ten are too few labels; and over which all ticks get one
+BETWEEN = ((0.8, (2.0, 5.0)), (0.4, (2.0, 3.0, 5.0, 7.0)))  # digits that have room, from so many decades
 EXACT = 1e-16, 1e-12  # errors on the axis where none is above zero
 ABOVE = 0.03  # of the height of a panel, free for the rings around the highest points
 ROOM = 15  # entries of a legend for which a place of the grid is high enough
@@ -126,10 +127,20 @@ def _panel(
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_major_locator(LogLocator(numticks=12))
         axis.set_minor_formatter(LogFormatterSciNotation(minor_thresholds=FEW))
+    ticks_between_powers(axes)
     axes.tick_params(which="minor", labelsize="small")
     axes.grid(True, which="major")
     axes.set_xlabel(COST_WORDS[against])
     axes.set_ylabel(error_words(diagram, measure))
+
+
+def ticks_between_powers(axes: Axes) -> None:
+    """Along the cost ticks between powers of ten with labels that have room, where fewer than two powers have any."""
+    low, high = np.log10(axes.get_xlim())
+    powers = np.floor(high) - np.ceil(low) + 1
+    if powers < 2 and (places := next((at for decades, at in BETWEEN if high - low > decades), None)):
+        axes.xaxis.set_minor_locator(LogLocator(subs=places))
+        axes.xaxis.set_minor_formatter(LogFormatterSciNotation(minor_thresholds=(np.inf, np.inf)))
 
 
 def _scale_of_errors(axes: Axes, floor: float) -> None:

@@ -48,8 +48,11 @@ def independent_blocks(constraints: Constraints, x: Array, v: Array) -> Independ
     here = _dependence(constraints, x, v)
     in_motion = _in_motion(constraints, x, v, here)
     blocks, N, singular = list(constraints.blocks), in_motion.combinations, here.count > in_motion.count
-    for name in _drivers_in(N, blocks):
-        raise InputError(f"driver {name!r} prescribes a motion that the joints and other drivers already fix")
+    if drivers := _drivers_in(N, blocks):
+        raise InputError(
+            f"driver {drivers[0]!r} prescribes a motion that the joints and other drivers already fix; leave out "
+            f"{' or '.join(map(repr, drivers))}"
+        )
     if not N.size:
         return Independent(blocks, [], singular)
     said = [(block, word) for block in blocks for word in block.words]

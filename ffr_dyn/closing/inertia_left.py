@@ -5,12 +5,17 @@ Bodies from files of other programs may lack it (`ffr_prep.body.immovable`), or 
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import numpy as np
+
 from ffr_dyn.equations.layout import Layout
 from ffr_dyn.scene.scene import Body, Scene, body_normal
 from ffr_prep.body import FlexibleBody, immovable, remembered
 from ffr_prep.common.errors import InputError
 
 _AXES = "xyz"
+_TRACE = 1e-6  # of the moments of a body: what is added about an axis that has none
 
 
 def require_inertia(scene: Scene, place: Layout) -> None:
@@ -25,6 +30,26 @@ def require_inertia(scene: Scene, place: Layout) -> None:
                 f"body {body.name!r} cannot move: it has no inertia left for {motion}; give it mass and inertia about all "
                 f"axes{flexible}"
             )
+
+
+def with_traces(scene: Scene) -> Scene:
+    """The scene with a trace of inertia of its rigid and its planar bodies about axes that have none.
+
+    What is planar runs without it, and is looked at in space with it: no moment acts about such an axis. Where no body lacks
+    any the scene is as it is.
+    """
+    bodies = tuple(_with_trace(body) for body in scene.bodies)
+    same = all(traced is body for traced, body in zip(bodies, scene.bodies, strict=True))
+    return scene if same else replace(scene, bodies=bodies)
+
+
+def _with_trace(body: Body) -> Body:
+    model = body.model
+    if "plane" not in model.provenance and (model.n or not _immovable(model, tuple(range(6)))):
+        return body
+    traced = model.rr_dm + _TRACE * float(np.trace(model.rr_dm)) * np.eye(3)
+    said = {key: value for key, value in model.provenance.items() if key != "plane"}
+    return replace(body, model=replace(model, rr_dm=traced, provenance=said))
 
 
 def _immovable(model: FlexibleBody, active: tuple[int, ...]) -> str:

@@ -31,13 +31,18 @@ def close_positions(constraints: Constraints, x: Array, v: Array) -> Array:
     place = constraints.place
     if np.abs(open_at(constraints, x, v)[0]).max(initial=0.0) < TOLERANCE:
         return x
+    start = x
     for elastic in (False, True):
-        found = x
+        found, nearest = start, np.inf
         for _ in range(ITERATIONS):
             rows = rows_at(constraints, found, v)
-            closed = np.abs(rows.Phi).max(initial=0.0) < TOLERANCE
+            left = np.abs(rows.Phi).max(initial=0.0)
+            if not elastic and left < nearest:  # from where bodies deform, if they must, by as little as they can
+                start, nearest = found, left
             found = moved(place, found, _limited(place, _step(constraints, found, rows, -rows.Phi, elastic)))
-            if closed:  # and now to rounding, which tells rows that depend on others from those that nearly do
+            if (
+                left < TOLERANCE
+            ):  # and now to rounding, which tells rows that depend on others from those that nearly do
                 return found
     raise _open(constraints, rows)
 

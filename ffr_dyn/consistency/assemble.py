@@ -15,7 +15,7 @@ from ffr_dyn.closing.coupled_turns import TURN
 from ffr_dyn.closing.driven_angles import driven_angles, led_to_drivers
 from ffr_dyn.closing.going_on import going_on
 from ffr_dyn.closing.independence import independent_blocks
-from ffr_dyn.closing.inertia_left import require_inertia
+from ffr_dyn.closing.inertia_left import require_inertia, with_traces
 from ffr_dyn.closing.positions import close_positions, close_velocities
 from ffr_dyn.compile.scene_tables import System, compile_scene
 from ffr_dyn.consistency.across import rows_across
@@ -245,3 +245,10 @@ def _in_space(scene: Scene, found: dict[str, str]) -> str:
 def in_space(scene: Scene) -> Scene:
     """The scene without a search for a plane: what could leave it counts, even where nothing pushes it out."""
     return replace(scene, plane="none") if scene.plane == "auto" else scene
+
+
+def seen_in_space(scene: Scene) -> Scene:
+    """As `in_space`; bodies that lack inertia across the plane that the scene is computed in have a trace of it."""
+    if scene.plane != "auto" or (traced := with_traces(scene)) is scene:
+        return in_space(scene)
+    return in_space(traced if _in_plane_or_space(scene, 0.0).scene.plane != "none" else scene)

@@ -82,7 +82,7 @@ class Seen:
 
     method    : of its steps; None where it has none
     tolerance : that constraints are to be met with [m, -];  apart : from where a mechanism has come apart
-    arrays    : "bodies" (3, B) as `ffr_dyn.consistency.validity.extremes`; "open" (3,) the largest constraint left open, its
+    arrays    : "bodies" (4, B) as `ffr_dyn.consistency.validity.extremes`; "open" (3,) the largest constraint left open, its
                 time, its number; "driven" (2, D) of each driver the largest difference from what it prescribes, and its
                 largest second derivative; "rates" (F,) [1/s] of the forces that the method takes explicitly; "wound" (F,)
                 [rad] how far the axes of forces in six directions are turned against each other; "x" (X,) of the last row
@@ -104,7 +104,7 @@ def nothing_seen(
 ) -> Seen:
     """Before the first row."""
     scene = assembled.system.scene
-    sizes = {"bodies": (3, len(scene.bodies)), "open": (3,), "driven": (2, len(scene.drivers))}
+    sizes = {"bodies": (4, len(scene.bodies)), "open": (3,), "driven": (2, len(scene.drivers))}
     sizes |= {"rates": (len(forces_of(scene)),), "wound": (len(forces_of(scene)),), "x": (assembled.x.size,)}
     return Seen(assembled, method, tolerance, apart, {name: np.zeros(size) for name, size in sizes.items()})
 
@@ -219,7 +219,7 @@ def ended(analysis: str, seen: Seen, more: Mapping[str, Sequence[str]] | None = 
 
 def _found(seen: Seen) -> dict[str, list[str]]:
     """All doubts, with their texts."""
-    scene, (turned, spun, stretched) = seen.scene, seen.arrays["bodies"]
+    scene, (turned, spun, deflected, stretched) = seen.scene, seen.arrays["bodies"]
     lost, quick = meaningless(scene, seen.arrays["bodies"]), list(_quick(seen))
     return {
         **_constraints(seen, quick),
@@ -229,7 +229,7 @@ def _found(seen: Seen) -> dict[str, list[str]]:
         QUICK: quick,
         STIFF: [] if seen.method is None else told(seen.assembled.system, seen.method, seen.arrays["rates"]),
         WOUND: [text for k, force in _forces(seen) if (text := force.beyond(float(seen.arrays["wound"][k])))],
-        STRAINED: strained(scene, turned, stretched),
+        STRAINED: strained(scene, turned, deflected, stretched),
         MEANINGLESS: [lost] if lost else [],
         SPUN: unstiffened(scene, spun),
         MASS: list(_dependent(seen.assembled.system, seen.arrays["x"])),

@@ -32,7 +32,7 @@ def held_frequencies(scene: Scene, poses: Iterable[tuple[Array, Array]], plane: 
 
     poses : assembled positions and Euler parameters of the bodies;  plane : normal of a scene that is planar, or "none"
     """
-    if not any(HELD in body.model.provenance for body in scene.bodies):
+    if not any(HELD in body.model.provenance and body.model.n for body in scene.bodies):
         return []
     placed = [
         replace(body, position=R, rotation=p, q=None, q_dot=None)
@@ -40,6 +40,8 @@ def held_frequencies(scene: Scene, poses: Iterable[tuple[Array, Array]], plane: 
     ]
     scene, notes = replace(scene, bodies=tuple(placed), plane="none"), []
     for b, body in enumerate(scene.bodies):
+        if not body.model.n:  # one that is taken as undeformed
+            continue
         blocks = [block for block in blocks_of(scene) if _touches(scene, block, body)]
         reference = _reference(scene, body, blocks)
         if reference is not None:

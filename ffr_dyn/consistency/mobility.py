@@ -7,13 +7,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ffr_dyn.closing.independence import redundant_drivers
-from ffr_dyn.consistency.assemble import assemble, flat_form, flattened, in_space
+from ffr_dyn.consistency.assemble import Assembled, assemble, flat_form, flattened, seen_in_space
 from ffr_dyn.consistency.evaluation import free_motions, locked, total_mass_matrix, unit_rows
 from ffr_dyn.equations.constraint_rows import Block, rows_at
 from ffr_dyn.equations.constraints import evaluate_word
 from ffr_dyn.equations.layout import Layout
 from ffr_dyn.scene.joints import COORDINATES, RELATION, Joint, Word, coordinate_axes, frames
-from ffr_dyn.scene.scene import Scene, marker_number
+from ffr_dyn.scene.scene import Body, Scene, marker_number, require_scene
+from ffr_prep.body import truncated
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.brief import Brief
 from ffr_prep.common.errors import InputError
@@ -40,7 +41,9 @@ class FreeMotion(Brief):
 class Mobility(Brief):
     """The freedom that the joints and drivers of a scene leave at its assembled start.
 
-    degrees_of_freedom : rigid and elastic;  elastic : number of elastic coordinates
+    degrees_of_freedom : of the bodies as they are;  elastic : number of elastic coordinates
+    rigid      : degrees of freedom with all bodies undeformed. Joints that rigid bodies would hold twice deform elastic ones,
+                 so that rigid and elastic together may be more than degrees_of_freedom
     plane      : normal of a planar scene, "x", "y" or "z"; otherwise "none". A scene that declares no plane is looked at in
                  space all the same: motions and redundant rows are those that it has there
     computed   : whether runs are computed in the plane or in space, and why, in words
@@ -53,6 +56,7 @@ class Mobility(Brief):
     """
 
     degrees_of_freedom: int
+    rigid: int
     elastic: int
     plane: str
     computed: str
@@ -63,22 +67,43 @@ class Mobility(Brief):
 
     def lines(self) -> list[str]:
         """The report, a line each."""
-        said = [counted(self.degrees_of_freedom, self.elastic, len(self.redundant))]
+        said = [counted(self.degrees_of_freedom, self.rigid, self.elastic, len(self.redundant))]
         said.append(f"computed     {self.computed}")
         said += [f"free         {motion.name}: moves {', '.join(motion.bodies)}" for motion in self.free]
         said += [f"redundant    {joint}: {row}" for joint, row in self.redundant]
-        said += [f"overdriven   {driver}" for driver in self.overdriven]
+        said += [f"overdriven   {driver} (all else is counted without drivers)" for driver in self.overdriven]
         return said + [f"doubt        {doubt}" for doubt in self.doubts]
 
 
-def counted(degrees_of_freedom: int, elastic: int, redundant: int) -> str:
+def counted(degrees_of_freedom: int, rigid: int, elastic: int, redundant: int) -> str:
     """The counts in words: "3 rigid degrees of freedom, 2 redundant rows; 101 elastic coordinates"."""
-    rigid, rows = degrees_of_freedom - elastic, f", {redundant} redundant row{'s' * (redundant > 1)}" * bool(redundant)
-    said = (
-        f"{max(rigid, 0)} rigid degree{'s' * (rigid != 1)} of freedom{rows}"
-        + f"; {elastic} elastic coordinates" * bool(elastic)
+    rows = f", {redundant} redundant row{'s' * (redundant > 1)}" * bool(redundant)
+    said = f"{rigid} rigid degree{'s' * (rigid != 1)} of freedom{rows}" + f"; {elastic} elastic coordinates" * bool(
+        elastic
     )
-    return said if rigid >= 0 else f"{said}, which joints and drivers deform in {-rigid} ways"
+    deformed = rigid + elastic - degrees_of_freedom
+    return f"{said}, which joints and drivers deform in {deformed} ways" if deformed > 0 else said
+
+
+def undeformed(scene: Scene) -> Scene:
+    """The scene with rigid bodies of the same inertia and interfaces."""
+    require_scene(scene)
+    return replace(scene, bodies=tuple(_rigid(body) if body.model.n else body for body in scene.bodies))
+
+
+def _rigid(body: Body) -> Body:
+    return replace(body, model=truncated(body.model, 0), q=None, q_dot=None, damping=0.0, stiffening=False, frame=None)
+
+
+def rigid_freedom(scene: Scene, assembled: Assembled, time: float) -> int:
+    """Degrees of freedom of a scene with all bodies undeformed at `time` [s]; where that cannot be, as it is assembled."""
+    elastic = sum(assembled.system.layout.n)
+    if not elastic:
+        return assembled.degrees_of_freedom
+    try:
+        return assemble(undeformed(scene), time=time).degrees_of_freedom
+    except InputError:
+        return max(assembled.degrees_of_freedom - elastic, 0)
 
 
 def mobility(scene: Scene, *, time: float = 0.0, drivers: bool = True) -> Mobility:
@@ -88,7 +113,7 @@ def mobility(scene: Scene, *, time: float = 0.0, drivers: bool = True) -> Mobili
 
     >>> print(fd.mobility(scene))
     """
-    whole, scene = flat_form(scene, time), in_space(scene)
+    whole, scene = flat_form(scene, time), seen_in_space(scene)
     over = overdriven(scene, time) if drivers and scene.drivers else ()
     bare = scene if drivers and not over else replace(scene, drivers=())
     assembled = assemble(bare, time=time)
@@ -102,12 +127,13 @@ def mobility(scene: Scene, *, time: float = 0.0, drivers: bool = True) -> Mobili
     doubts = tuple(note for note in assembled.notes if note.startswith(("body ", "gravity ")))
     elastic = sum(place.n)
     free, plane = assembled.degrees_of_freedom, whole.scene.plane
-    return Mobility(free, elastic, plane, whole.computed, motions, assembled.redundant, over, doubts)
+    left = rigid_freedom(bare, assembled, time)
+    return Mobility(free, left, elastic, plane, whole.computed, motions, assembled.redundant, over, doubts)
 
 
 def overdriven(scene: Scene, time: float = 0.0) -> tuple[str, ...]:
     """Drivers that prescribe what the joints and the other drivers fix already, seen from the start without them."""
-    flat = flat_form(in_space(scene), time)
+    flat = flat_form(seen_in_space(scene), time)
     assembled = assemble(replace(flat.scene, drivers=()), time=time)
     return redundant_drivers(flat.rows, assembled.x, assembled.v)
 
@@ -120,9 +146,7 @@ def require_driven(scene: Scene, time: float, analysis: str) -> None:
             f"over-driven: {', '.join(map(repr, found.overdriven))} prescribe a motion that the joints and other drivers "
             "already fix; remove a driver"
         )
-    if (
-        found.degrees_of_freedom > found.elastic
-    ):  # at a singular position there are more free motions than the mechanism has
+    if found.rigid:  # at a singular position there are more free motions than the mechanism has
         said = "; ".join(f"{motion.name} (moves {', '.join(motion.bodies)})" for motion in found.free)
         raise InputError(f"{analysis} needs every rigid motion prescribed by a driver; free: {said}")
 

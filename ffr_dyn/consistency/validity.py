@@ -27,6 +27,11 @@ STRAINED = 0.1  # elastic rotation [rad] beyond which linear elasticity in the m
 # is off by 0.1 % of its deflection at 0.2 rad, and 16 times less in twice as many parts.
 BENT = 0.2
 STRETCHED = 0.1  # deflection of one interface against another over the size of the body, beyond which the same holds
+NEAR = 1e-2  # of its size: interfaces closer to each other tell nothing of how far a body is stretched
+TORN = (
+    "two of its interfaces are {:.2g} of their distance farther apart or nearer, which in a straight body is strain, far "
+    "beyond linear elasticity and in parts as well: what joints, drivers and loads ask of it does not fit its length"
+)
 # Share of the first frequency that a body may spin at without geometric stiffening. The frequencies of a blade are then off
 # by about half its square; a pendulum and a slider-crank with 0.08 and 0.09 were off by 1 mm in 1.2 m after 0.5 s and by
 # 21 % of the deflection.
@@ -34,12 +39,14 @@ SPINNING = 0.03
 
 
 def extremes(system: System, record: Record) -> Array:
-    """(3, B) of each body: the largest elastic rotation [rad] of one interface against another, the largest angular velocity
-    [rad/s], the largest deflection of one against another over the size of the body."""
-    place, found = system.layout, np.zeros((3, len(system.scene.bodies)))
+    """(4, B) of each body: the largest elastic rotation [rad] of one interface against another, the largest angular velocity
+    [rad/s], the largest deflection of one against another over the size of the body, the largest change of their distance
+    over that."""
+    place, found = system.layout, np.zeros((4, len(system.scene.bodies)))
     found[1] = angular_speeds(place, record.v).max(axis=0, initial=0.0)
     for b, body in enumerate(system.scene.bodies):
-        found[::2, b] = deflections(body.model, record.x[:, place.q(b)])
+        q = record.x[:, place.q(b)]
+        found[::2, b], found[3, b] = deflections(body.model, q), stretch(body.model, q)
     return found
 
 
@@ -54,21 +61,47 @@ def deflections(model: FlexibleBody, q: Array) -> tuple[float, float]:
     return turn, shift / model.size if model.size > 0 else 0.0
 
 
+def stretch(model: FlexibleBody, q: Array) -> float:
+    """The largest change, to first order, of the distance of an interface from those that it is seen from, over that."""
+    if len(model.interfaces) < 2 or not model.n:
+        return 0.0
+    along = remembered(model, "stretch", lambda: _along(model))
+    return float(np.abs(along @ q.T).max(initial=0.0))
+
+
+def _along(model: FlexibleBody) -> Array:
+    """(K, n) changes of the distances of all pairs of different places, over these."""
+    moved, rows = remembered(model, "deflections", lambda: _between_points(model)), []
+    for at, shifts in zip(_seen_from(model), moved[:, :, 1], strict=True):
+        ways = np.array([i.position - at.position for i in model.interfaces])
+        apart = np.linalg.norm(ways, axis=1)
+        rows += [
+            way @ shift / far**2 for way, shift, far in zip(ways, shifts, apart, strict=True) if far > NEAR * model.size
+        ]
+    return np.array(rows).reshape(-1, model.n)
+
+
+def _seen_from(model: FlexibleBody) -> tuple[Interface, ...]:
+    """The first interface and the one farthest from it; the frame of the body where there is one alone."""
+    points = model.interfaces
+    if len(points) == 1:
+        return (Interface("frame", points[0].position, *np.zeros((2, 3, model.n))),)
+    return points[0], max(points, key=lambda i: float(np.linalg.norm(i.position - points[0].position)))
+
+
 def _between_points(model: FlexibleBody) -> Array:
     """(1 or 2, I, 2, 3, n) rotation and translation of all interfaces, seen from those that they are seen from."""
-    points = model.interfaces
-    far = max(points, key=lambda i: float(np.linalg.norm(i.position - points[0].position)))
-    bases = (
-        (points[0], far) if len(points) > 1 else (Interface("frame", points[0].position, *np.zeros((2, 3, model.n))),)
-    )
     return np.array([
-        [(i.phi_r - at.phi_r, i.phi_t - at.phi_t + np.cross(i.position - at.position, at.phi_r, axisb=0).T) for i in points]
-        for at in bases
+        [
+            (i.phi_r - at.phi_r, i.phi_t - at.phi_t + np.cross(i.position - at.position, at.phi_r, axisb=0).T)
+            for i in model.interfaces
+        ]
+        for at in _seen_from(model)
     ])  # fmt: skip
 
 
 def meaningless(scene: Scene, found: Array) -> str:
-    """Why a run with these extremes (3, B) tells nothing any more; empty where it does."""
+    """Why a run with these extremes (4, B) tells nothing any more; empty where it does."""
     b = int(np.argmax(found[0]))
     if not found[0, b] > MEANINGLESS:
         return ""
@@ -79,19 +112,20 @@ def meaningless(scene: Scene, found: Array) -> str:
     )
 
 
-def strained(scene: Scene, turned: Array, stretched: Array) -> list[str]:
-    """Bodies that deform too much for one moving frame; turned (B,) [rad], stretched (B,) of the body's size. Of a body in
-    parts the one that does so most.
+def strained(scene: Scene, turned: Array, deflected: Array, stretched: Array) -> list[str]:
+    """Bodies that deform too much for one moving frame; turned (B,) [rad], deflected (B,) of the body's size, stretched (B,)
+    of the distance of two interfaces. Of a body in parts the one that does so most.
     """
     worst: dict[str, tuple[float, str]] = {}
-    for body, turn, share in zip(scene.bodies, turned, stretched, strict=True):
+    for body, turn, share, longer in zip(scene.bodies, turned, deflected, stretched, strict=True):
         limit = BENT if stiffened(body) else STRAINED
         beyond = max(share / STRETCHED, turn / limit)
         if beyond > max(1.0, worst.get(owner(body), (0.0, ""))[0]):
+            parts = f"{_enough(_count(body), turn / limit, share / STRETCHED)} parts would do (ffr-prep reduce --parts)"
             note = (
                 f"body {body.name!r} deforms by up to {share:.2g} of its size and turns within itself by up to {turn:.2g} "
                 f"rad: one moving frame is strained beyond about {STRETCHED:g} of the size or {limit:g} rad; "
-                f"{_enough(_count(body), turn / limit, share / STRETCHED)} parts would do (ffr-prep reduce --parts)"
+                f"{parts if longer <= STRETCHED else TORN.format(longer)}"
             )
             worst[owner(body)] = beyond, note
     return [note for _, note in worst.values()]

@@ -61,6 +61,7 @@ from ffr_dyn.scene_file.state_formula import StateFormula, check_names
 from ffr_prep.body import BodyError, FlexibleBody, damped, load_body, rigid_body, truncated, with_point
 from ffr_prep.common.errors import InputError
 from ffr_prep.common.reading import reading
+from ffr_prep.common.strict import complaint, entry_keys
 
 # Files of other kinds, by an entry that a scene never has.
 _ANALYSIS = (
@@ -121,7 +122,7 @@ def _read(path: Path, parameters: Mapping[str, str]) -> tuple[Any, Source]:
     try:
         return scene_entry().model_validate(tree, context={"parameters": known}), source
     except ValidationError as error:
-        raise InputError(_explained(error, source)) from None
+        raise InputError(_explained(error, source, tree)) from None
 
 
 def _signals(table: Mapping[str, Any], parameters: Parameters) -> dict[str, TimeFunction]:
@@ -137,15 +138,17 @@ def _signals(table: Mapping[str, Any], parameters: Parameters) -> dict[str, Time
     }
 
 
-def _explained(error: ValidationError, source: Source) -> str:
-    """All complaints: where, what, and the value."""
+def _explained(error: ValidationError, source: Source, tree: Mapping[str, Any]) -> str:
+    """All complaints: where, what, and the value. What may be a list or a number is blamed for one."""
     lines: dict[str, None] = {}
-    for item in _likeliest(error.errors()):
-        keys = tuple(str(part) for part in item["loc"])
+    items = [(entry_keys(item, tree), item) for item in _likeliest(error.errors())]
+    better = [where for where, item in items if item["type"] not in ("list_type", "float_type")]
+    for where, item in items:
+        if any(where == of[: len(where)] and item["type"] in ("list_type", "float_type") for of in better):
+            continue
         plain = isinstance(item["input"], (str, int, float, bool, list))
         value = f" (it is {item['input']!r})" if plain and item["type"] != "missing" else ""
-        text = _with_nearest(item, item["msg"].removeprefix("Value error, ").removeprefix("it: "))
-        where = tuple(key for key in keys if not key.startswith(("[", "list[", "function-")))
+        text = _with_nearest(item, complaint(item).removeprefix("it: "))
         at = (*where, misspelt[1]) if (misspelt := re.match(r"'(.+?)' is not a known entry", text)) else where
         lines[f"{origin(source, at)}: {'.'.join(where) or 'file'}: {text}{value}"] = None
     return "; ".join(lines)
@@ -173,8 +176,8 @@ def _with_nearest(item: Any, text: str) -> str:
     if item["type"] == "kind" and isinstance(item["input"], dict):
         given, known = item["input"].get("kind"), text.partition("there are ")[2].split(", ")
         text = text.replace("no such kind", f"no kind {given!r}")
-    elif item["type"] == "missing":
-        return "is required, and missing" + (f"; {_ANALYSIS}" if item["loc"] == ("analysis",) else "")
+    elif item["type"] == "missing" and item["loc"] == ("analysis",):
+        return f"{text}; {_ANALYSIS}"
     elif item["type"] == "dict_type" and isinstance(item["input"], list):
         return f"must be tables with names; write [{'.'.join(map(str, item['loc']))}.NAME] for each"
     elif item["type"] == "literal_error":

@@ -49,6 +49,7 @@ from ffr_prep.common.brief import Brief, cut
 from ffr_prep.common.entries import places_of
 from ffr_prep.common.errors import InputError
 from ffr_prep.common.reading import read_toml
+from ffr_prep.common.strict import complaint, entry_keys
 from ffr_prep.common.units import dimension_of, in_words, split_quantity
 
 MAKING = ("reduce", "reduce-structure", "reduce-matrices")
@@ -130,11 +131,9 @@ def load_study(path: str | Path) -> Study:
         entry = StudyFile.model_validate(tree)
     except ValidationError as error:
         first = min(error.errors(), key=lambda one: one["type"] != "extra_forbidden")
-        where = ".".join(map(str, first["loc"]))
+        where = ".".join(entry_keys(first, tree))
         hint = f"; {_hint(where)}" if first["type"] == "extra_forbidden" else f" (it is {first['input']!r})"
-        raise InputError(
-            f"{path}: {where}: {first['msg'].lower()}{hint if first['type'] != 'missing' else ''}"
-        ) from None
+        raise InputError(f"{path}: {where}: {complaint(first)}{hint if first['type'] != 'missing' else ''}") from None
     try:
         return study(
             path.parent / entry.scene, entry.parameters, entry.outputs, bodies={k: b.make for k, b in entry.bodies.items()},

@@ -212,9 +212,9 @@ def _found_asymmetry(part: Body, k: int, used: tuple[str, ...]) -> str:
     off = max(places, key=lambda name: abs(places[name]))
     if abs(places[off]) > BESIDE * length:
         return f"{off} is {abs(places[off]):.3g} m off the plane through its centre of mass"
-    products = max(abs(body.rr_dm[k, c]) for c in range(3) if c != k) / (body.mass * length**2)
-    if products > BESIDE:
-        return f"a product of inertia is {products:.2g} of its moments"
+    products, whole = max(abs(body.rr_dm[k, c]) for c in range(3) if c != k), body.mass * length**2
+    if products > BESIDE * whole:
+        return f"a product of inertia is {products / whole:.2g} of its moments"
     if not body.n:
         return ""
     mixed = _mixed_modes(body, k, used, second_order=part.stiffening and body.stiffening is not None)

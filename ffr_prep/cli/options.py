@@ -101,6 +101,11 @@ def material_of(texts: Sequence[str]) -> Solid | Mapping[str, Solid]:
     """One material, or materials by group where a text is GROUP=MATERIAL."""
     from ffr_prep.model.material import parse_material
 
+    if not texts:
+        raise InputError(
+            "what is the part made of? Give --material steel, or another of the library, or E=2.1e11,nu=0.3,rho=7850; of "
+            "several volumes --material VOLUME=steel for each"
+        )
     groups = [
         re.fullmatch(r"(?!(?:E[123]?|nu(?:12|13|23)?|G(?:12|13|23)|rho|name)=)([^=,]+)=(.+)", text) for text in texts
     ]
@@ -116,11 +121,12 @@ def material_of(texts: Sequence[str]) -> Solid | Mapping[str, Solid]:
 
 
 def interface_of(text: str) -> InterfaceRegion:
-    """NAME[=REGION][:rigid|mean][@x,y,z]."""
+    """NAME[=REGION][:rigid|mean][@x,y,z], the last two in either order."""
     from ffr_prep.mesh.geometry.region_words import is_query
     from ffr_prep.model.coupled import InterfaceRegion
 
-    parts = re.fullmatch(r"([^=:@]+)(?:=(.+?))?(?::(\w+))?(?:@([^@]+))?", text)
+    ordered = re.sub(r"(@[^@:]+)(:\w+)$", r"\2\1", text)
+    parts = re.fullmatch(r"([^=:@]+)(?:=(.+?))?(?::(\w+))?(?:@([^@]+))?", ordered)
     if parts is None:
         raise InputError(f"--interface {text}: write NAME, NAME:mean, NAME=SURFACE or NAME@x,y,z (see --help)")
     if is_query(text):

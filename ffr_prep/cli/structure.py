@@ -89,10 +89,13 @@ def reduce_structure_command(structure: Path, output: Path, entries: tuple[str, 
 
 
 def frame_lines(frame: Frame) -> Iterator[str]:
-    """Size, extent and groups of a frame."""
+    """Size, extent and groups of a frame, and what is too thick for its size."""
+    from ffr_prep.structures.frame import thickness_doubts
+
     kinds = {"beams": frame.elements, "triangles": frame.triangles, "quadrilaterals": frame.quadrilaterals}
     elements = ", ".join(f"{len(nodes)} {kind}" for kind, nodes in kinds.items() if len(nodes))
     yield f"frame       {elements}; {len(frame.points)} nodes, {6 * len(frame.points)} degrees of freedom"
     extent = frame.points.max(axis=0) - frame.points.min(axis=0)
     yield f"extent      ({', '.join(f'{x:.5g}' for x in extent)}) m"
     yield f"groups      {', '.join(frame.node_groups) or 'none named'}"
+    yield from (f"note        {doubt}" for doubt in thickness_doubts(frame))

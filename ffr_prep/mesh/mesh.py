@@ -41,6 +41,10 @@ _COINCIDENT = 1e-9
 _DOUBTFUL_LENGTH = 20.0
 _LONG, _SHORT = 100.0, 3e-4  # bodies beyond are told of, whatever their unit [m]
 _SHOWN_PARTS = 5
+_SOLIDS_ALONE = (
+    "bodies are made of solids here: fill a closed surface with solids where the mesh is made; a frame of beams and plates "
+    "is described by a structure file, for `ffr-prep reduce-structure`"
+)
 _FAR = 1e30  # products of coordinates must be finite
 
 
@@ -139,7 +143,7 @@ def read_mesh(
     with reading(path, "a mesh or a geometry"):
         read: FileMesh = loaded(entry.read)(path, **of_geometry)
         if not read.blocks:
-            raise InputError(f"{path} has no volume elements; only solids can be reduced, not surfaces or beams")
+            raise InputError(f"{path} has no volume elements; {_SOLIDS_ALONE}")
         _check_places(path, read)
         known = unit or read.unit
         mesh = _in_metres(read, known or "m")
@@ -199,13 +203,15 @@ def _in_metres(read: FileMesh, unit: str) -> Mesh:
     faces = dict(zip(read.faces, whole, strict=False))
     drawn = zip(read.drawn, whole[len(faces) :], strict=True)
     nodes = {name: np.unique(new[members][new[members] >= 0]) for name, members in read.nodes.items()}
+    lost = [name for name, parts in faces.items() if not parts and any(len(part) for part in read.faces[name])]
+    lost += [name for name, members in nodes.items() if not members.size and read.nodes[name].size]
     return Mesh(
         points=points,
         blocks=tuple(Block(kind, nodes) for kind, nodes in blocks),
         volume_groups=dict(read.volumes),
         face_groups={name: parts for name, parts in faces.items() if parts},
         node_groups={name: members for name, members in nodes.items() if members.size},
-        notes=(*read.notes, *_left_out(len(read.points) - used.size, faces, nodes)),
+        notes=(*read.notes, *_left_out(len(read.points) - used.size, lost)),
         drawn=tuple(_drawn(face, facets, points, METRES[unit]) for face, facets in drawn if facets),
         unit=unit,
     )
@@ -221,8 +227,7 @@ def facet_triangles(facets: Sequence[Array]) -> Array:
     return np.concatenate([of[:, corners].reshape(-1, 3) for of, corners in zip(facets, parts, strict=True)])
 
 
-def _left_out(unused: int, faces: Mapping[str, tuple[Array, ...]], nodes: Mapping[str, Array]) -> list[str]:
-    lost = [name for name, parts in faces.items() if not parts] + [name for name, of in nodes.items() if not of.size]
+def _left_out(unused: int, lost: Sequence[str]) -> list[str]:
     notes = [f"{unused} nodes that belong to no volume element are left out"] if unused else []
     return notes + [f"group {name!r} is left out: nothing of it belongs to a volume element" for name in lost]
 
@@ -337,7 +342,7 @@ def check_mesh(mesh: Mesh) -> None:
 
 def _check_numbers(mesh: Mesh) -> None:
     if not sum(len(block.nodes) for block in mesh.blocks):
-        raise InputError("the mesh has no volume elements; only solids can be reduced, not surfaces or beams")
+        raise InputError(f"the mesh has no volume elements; {_SOLIDS_ALONE}")
     for kind, nodes in _pairs(mesh):
         if kind not in KINDS or nodes.shape[1:] != (KINDS[kind].size,):
             raise InputError(f"a block of kind {kind!r} has nodes of shape {nodes.shape}; kinds are {', '.join(KINDS)}")

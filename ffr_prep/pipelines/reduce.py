@@ -41,6 +41,7 @@ from ffr_prep.solvers.factor import CHOLESKY, FreeBody, Solver, SupportedBody, s
 from ffr_prep.solvers.threads import on_one_thread
 
 _MASSLESS = 1e-9
+_UNDEFORMED = "it has no shape to deform in, and moves as a rigid body: ask for modes, or for a higher frequency"
 _RIGID = 6  # coordinates of a body that does not deform
 UNDAMPED = Damping()
 
@@ -196,6 +197,8 @@ def _reduced(model: Model, request: Request, progress: Stages, advance: Advance)
         **vars(integrals),
     )
     warnings = [*made.provenance["warnings"], *units_doubts(made)]
+    if not made.n:
+        warnings.append(_UNDEFORMED)
     made = replace(made, provenance={**made.provenance, "warnings": list(dict.fromkeys(warnings))})
     return _with_held_body(made, model, body, progress)
 

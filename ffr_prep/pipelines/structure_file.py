@@ -35,6 +35,7 @@ from ffr_prep.common.entries import with_entries
 from ffr_prep.common.errors import InputError
 from ffr_prep.common.progress import Stages, no_stages
 from ffr_prep.common.reading import read_toml, reading
+from ffr_prep.common.strict import complaint, entry_keys
 from ffr_prep.mesh.mesh import Mesh, read_mesh
 from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.cuts import CutPlane, Cuts
@@ -146,18 +147,21 @@ def geometry_files(path: Path, entries: Mapping[str, str] = {}) -> list[Path]:
 def _read(path: Path, entries: Mapping[str, str]) -> StructureEntry:
     tree = read_toml(path, "a structure file")
     try:
-        return structure_schema().model_validate(with_entries(tree, entries))
+        tree = with_entries(tree, entries)
+        return structure_schema().model_validate(tree)
     except ValidationError as error:
-        raise InputError(f"{path}: {'; '.join(map(_explained, error.errors()))}") from None
+        raise InputError(f"{path}: {'; '.join(_explained(wrong, tree) for wrong in error.errors())}") from None
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
 
 
-def _explained(wrong: Mapping[str, Any]) -> str:
+def _explained(wrong: Mapping[str, Any], tree: Mapping[str, Any]) -> str:
     """Where, what, and the value."""
-    where = ".".join(str(part) for part in wrong["loc"]) or "the file"
-    value = "" if isinstance(wrong["input"], dict) else f" (it is {wrong['input']!r})"
-    return f"{where}: {wrong['msg'].removeprefix('Value error, ')}{value}"
+    where = ".".join(entry_keys(wrong, tree)) or "the file"
+    plain = not isinstance(wrong["input"], dict) and wrong["type"] != "missing"
+    value = f" (it is {wrong['input']!r})" if plain else ""
+    in_si = "; write it without a unit, in SI units" if wrong["type"] == "float_parsing" else ""
+    return f"{where}: {complaint(wrong)}{value}{in_si}"
 
 
 # ---- parts --------------------------------------------------------------------------------------------------------

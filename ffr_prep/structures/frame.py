@@ -30,6 +30,7 @@ _SAME_PLACE = 1e-9
 _SAME_WAY = 1 - 1e-9  # the cosine between two ways that are one
 
 _MOST_ELEMENTS = 10_000_000
+_THICK = 0.2  # thickness over the size of a sheet; shear then takes a tenth of its lowest frequencies
 _FAR = 1e100  # m; squares of coordinates must be finite
 
 
@@ -423,6 +424,42 @@ def overlap_doubts(frame: Frame) -> list[str]:
         for what, found in (("beams", _doubled_beams(frame)), ("plates", _doubled_plates(frame)))
         if found
     ]
+
+
+def thickness_doubts(frame: Frame) -> list[str]:
+    """Notes on sheets too thick for plates and on sections deeper than the frame is long: most likely in millimetres."""
+    across = _across(frame, frame.elements.ravel())
+    deep = {f"section {of.section.name}": depth for of in frame.members if (depth := _depth(of.section)) > across}
+    sheets = [_sheet(frame, k) for k in range(len(frame.shells))]
+    thick = [(of, size) for of, size in zip(frame.shells, sheets, strict=True) if of.thickness > _THICK * size]
+    return [
+        *(
+            f"{name} is {depth:.3g} m deep and the beams of the frame reach {across:.3g} m: are the sizes of the section in "
+            "millimetres? They are in metres"
+            for name, depth in deep.items()
+        ),
+        *(
+            f"a sheet of {of.material.name} is {of.thickness:.3g} m thick and {size:.3g} m across, too thick for a plate: is "
+            "its thickness in millimetres? It is in metres; mesh a thick part with solids"
+            for of, size in thick
+        ),
+    ]
+
+
+def _depth(section: Section) -> float:
+    """The height [m] of a rectangle with the area and the larger second moment of a section."""
+    return math.sqrt(12 * max(section.Iy, section.Iz) / section.A)
+
+
+def _sheet(frame: Frame, shell: int) -> float:
+    """The size [m] of the plates of a shell; inf where there are none."""
+    three = len(frame.triangles)
+    parts = (frame.triangles[frame.shell_of[:three] == shell], frame.quadrilaterals[frame.shell_of[three:] == shell])
+    return _across(frame, np.concatenate([part.ravel() for part in parts]))
+
+
+def _across(frame: Frame, nodes: Array) -> float:
+    return float(np.linalg.norm(np.ptp(frame.points[nodes], axis=0))) if nodes.size else math.inf
 
 
 def _doubled_beams(frame: Frame) -> list[Array]:

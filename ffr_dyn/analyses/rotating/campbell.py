@@ -19,7 +19,7 @@ from scipy.optimize import brentq
 from ffr_dyn.analyses.registry import OfMoment, option
 from ffr_dyn.analyses.rotating.steady import SPEEDS, TURN, distinct, growing, rounding
 from ffr_dyn.analyses.settings import MomentSettings
-from ffr_dyn.consistency.assemble import assemble, in_space
+from ffr_dyn.consistency.assemble import assemble, seen_in_space
 from ffr_dyn.linear.prestrained import told
 from ffr_dyn.linear.spectrum import Spectrum, followed, spectrum
 from ffr_dyn.linear.speeds import at_speed, speed_list
@@ -173,7 +173,7 @@ def _slowest(spectra: Sequence[Spectrum], whirling: Array) -> Array:
 
 def _at_speeds(scene: Scene, turn: str, time: float) -> Callable[[float, Spectrum | None], Spectrum]:
     def at(speed: float, near: Spectrum | None) -> Spectrum:
-        assembled = assemble(in_space(at_speed(scene, speed, turn, time)), time=time)
+        assembled = assemble(seen_in_space(at_speed(scene, speed, turn, time)), time=time)
         return spectrum(steady_state(assembled, time, near.found.x if near else None))
 
     return at

@@ -16,7 +16,7 @@ from ffr_dyn.analyses.integration import with_all_reactions
 from ffr_dyn.analyses.outcome import result_of, with_quantities
 from ffr_dyn.analyses.registry import OfMoment, option
 from ffr_dyn.analyses.settings import MomentSettings
-from ffr_dyn.consistency.assemble import Assembled, assemble, in_space
+from ffr_dyn.consistency.assemble import Assembled, assemble, seen_in_space
 from ffr_dyn.consistency.doubts import checked
 from ffr_dyn.consistency.evaluation import evaluator, joined, record_states
 from ffr_dyn.linear.spectrum import Spectrum, spectrum
@@ -154,7 +154,7 @@ def steady_states(
     """The scene in space and its steady state, at every speed, each beginning where the last one ended."""
     last = None
     for one in [at_speed(scene, speed, turn, time) for speed in speed_list(speeds)] or [scene]:
-        assembled = assemble(in_space(one), time=time)
+        assembled = assemble(seen_in_space(one), time=time)
         found = steady_state(assembled, time, last)
         last = found.x
         yield assembled, found

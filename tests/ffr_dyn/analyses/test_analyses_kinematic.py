@@ -8,8 +8,11 @@ import numpy as np
 import pytest
 from synthetic import cloud
 
+import ffr_prep as fp
 from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.analyses.kinematic import kinematic
+from ffr_dyn.analyses.static import static
+from ffr_dyn.consistency.assemble import assemble
 from ffr_dyn.consistency.mobility import mobility
 from ffr_dyn.functions.time_functions import polynomial, table
 from ffr_dyn.integrators import RK4
@@ -94,6 +97,57 @@ def test_mobility_in_words():
     assert any("main.angle" in line for line in free.lines())
     driven = mobility(slider_crank(0.2, 0.7, MOTOR))
     assert (driven.degrees_of_freedom, driven.free, driven.overdriven) == (0, (), ())
+
+
+def hinged_slider_crank() -> Scene:
+    """With a flexible rod between revolute joints, which three rows bend that rigid bodies would have twice."""
+    line = fp.polyline(
+        [(0, 0, 0), (0.7, 0, 0)], fp.Member(fp.rectangle(0.02, 0.01), fp.material("steel"), (0, 1, 0)), elements=4
+    )
+    ends = [fp.InterfaceRegion("a"), fp.InterfaceRegion("b")]
+    request = fp.Request(name="rod", reference=fp.SimplySupported("a", "b"), reduction=fp.CraigBampton(2), linear=True)
+    rod = fp.reduce(fp.from_frame(fp.named(line, a=(0, 0, 0), b=(0.7, 0, 0)), ends), request)
+    scene = replace(slider_crank(0.2, 0.7), gravity=(0, 0, 0))
+    hinges = (Joint("pin", "revolute", "crank.b", "rod.a"), Joint("wrist", "revolute", "slider.c", "rod.b"))
+    drawn = scene.bodies[1]
+    bodies = (scene.bodies[0], Body("rod", rod, position=drawn.position, rotation=drawn.rotation), scene.bodies[2])
+    return replace(scene, bodies=bodies, joints=(scene.joints[0], *hinges, scene.joints[3]))
+
+
+@pytest.mark.parametrize("off", [0.0, 1e-9])
+def test_bodies_close_by_rigid_motion_as_far_as_that_goes(off):
+    """A rod that is drawn 6 mm beside its plane is shifted there. A pin that is a nanometre off, as by the rounding of a
+    mesh, cannot be closed by rigid motion alone: then the bodies deform by as little, and not by the millimetres."""
+    scene = hinged_slider_crank()
+    crank, rod, slider = scene.bodies
+    points = {"a": (0, 0, 0), "b": (0.2, 0, off)}
+    arm = rigid_body("crank", mass=1.0, inertia=(1e-3, 1e-3, 1e-3), centre_of_mass=(0.1, 0, 0), points=points)
+    scene = replace(
+        scene,
+        bodies=(
+            Body("crank", arm, rotation=crank.rotation),
+            replace(rod, position=np.add(rod.position, (0, 0, 0.006))),
+            slider,
+        ),
+        plane="none",
+    )
+    found = assemble(scene)
+    place = found.system.layout
+    assert abs(found.x[place.R(1)][2]) < 1e-8
+    assert np.abs(found.x[place.q(1)]).max() < 1e-8
+
+
+def test_a_flexible_rod_takes_nothing_from_the_freedom_of_the_crank():
+    """Its hinges bend it in three ways across the plane; the crank turns all the same, and nothing holds it at rest."""
+    scene = hinged_slider_crank()
+    rod = scene.bodies[1].model
+    free, driven = mobility(scene), mobility(replace(scene, drivers=(MOTOR,)))
+    assert (free.rigid, free.degrees_of_freedom, free.elastic) == (1, rod.n - 2, rod.n)
+    assert free.lines()[0].startswith("1 rigid degree of freedom; ")
+    assert free.lines()[0].endswith("which joints and drivers deform in 3 ways")
+    assert (driven.rigid, driven.degrees_of_freedom) == (0, rod.n - 3)
+    with pytest.raises(InputError, match=r"nothing holds the motion .* \(1 rigid degree of freedom"):
+        static(scene)
 
 
 def test_mobility_of_a_free_flexible_body():

@@ -9,11 +9,15 @@ import shutil
 import subprocess
 import sys
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.ticker import LogFormatterSciNotation
 from PIL import Image
 from places import ROOT
 from synthetic import cloud
@@ -22,7 +26,7 @@ from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.analyses.kinematic import Kinematic
 from ffr_dyn.analyses.settings import Settings
 from ffr_dyn.chart.diagram import COSTS, Diagram, Lost, Point, measures_of, quantities_of, run_variants, work_precision
-from ffr_dyn.chart.draw import draw_chart
+from ffr_dyn.chart.draw import FEW, draw_chart, ticks_between_powers
 from ffr_dyn.chart.meaning import check_meaning
 from ffr_dyn.chart.measures import Deflection, measure_of
 from ffr_dyn.chart.page import page, write_page
@@ -520,6 +524,26 @@ def test_the_table_has_all_digits(diagram, tmp_path):
     assert marked == len(diagram.front("energy", "cpu"))
 
 
+@pytest.mark.parametrize(
+    ("low", "high"), [(1.05e-3, 9.5e-2), (1.1e-3, 9e-3), (2.1e-3, 8e-3), (1.1e-3, 2.1e-3), (0.9e-3, 2)]
+)
+def test_labels_along_the_cost_do_not_overlap(low, high):
+    """On a panel as wide as those of a chart, with the ticks and the labels that it has."""
+    figure = Figure(figsize=(4.5, 4))
+    axes = figure.add_axes((0, 0.2, 1, 0.8))
+    axes.loglog([low, high], [1, 2])
+    axes.set_xlim(low, high)
+    axes.xaxis.set_minor_formatter(LogFormatterSciNotation(minor_thresholds=FEW))
+    ticks_between_powers(axes)
+    axes.tick_params(which="minor", labelsize="small")
+    FigureCanvasAgg(figure).draw()
+    shown = [label for label in axes.get_xticklabels(which="both") if label.get_text()]
+    shown = [label for label in shown if low <= label.get_position()[0] <= high]
+    spans = sorted((box.x0, box.x1) for box in (label.get_window_extent() for label in shown))
+    assert len(spans) >= 2
+    assert all(before[1] < after[0] for before, after in pairwise(spans))
+
+
 BROWSER = shutil.which("chromium") or shutil.which("google-chrome") or shutil.which("chrome")
 FLAGS = [
     "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking",
@@ -615,7 +639,7 @@ def test_options_go_before_the_chart_of_the_file(scene_file, tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ("[0.00625]", "[-1]", r"chart\.methods\.rk4\.0: Input should be greater than 0 \(it is -1\)"),
+        ("[0.00625]", "[-1]", r"chart\.methods\.rk4\.1: must be greater than 0 \(it is -1\)"),
         ("rk4", "rk5", r"chart\.methods.*'rk4'"),
         ("[2,", "[-2,", r"chart\.modes.*greater than or equal to 0"),
         ("I9", "I7", r"chart\.drop.*'I9'"),

@@ -14,7 +14,11 @@ from synthetic import cloud
 
 from ffr_dyn import cli
 from ffr_dyn.analyses.forward import forward
+from ffr_dyn.analyses.linearise import linearise
+from ffr_dyn.analyses.states import scene_at
+from ffr_dyn.analyses.static import static
 from ffr_dyn.consistency.assemble import assemble
+from ffr_dyn.consistency.mobility import mobility
 from ffr_dyn.functions.time_functions import polynomial, table
 from ffr_dyn.integrators import RK4, ROS2, GeneralisedAlpha, HalfExplicit
 from ffr_dyn.integrators.stabilisation import Drifting, Projection
@@ -259,6 +263,29 @@ def test_a_body_without_inertia_about_an_axis_is_named():
     needle = rigid_body("needle", mass=1.0, inertia=(0, 1, 1))
     with pytest.raises(InputError, match="body 'needle' cannot move: it has no inertia left for turning about x"):
         forward(Scene((Body("needle", needle),)), end=0.1, output_step=0.1)
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_body_without_any_inertia_is_named_alone():
+    """No warning of a division by zero goes before it."""
+    dot = rigid_body("dot", mass=1.0, inertia=(0, 0, 0), points={"a": (0, 0, 0)})
+    scene = Scene((Body("dot", dot),), (Joint("hinge", "revolute", "ground.O", "dot.a"),), ground={"O": (0, 0, 0)})
+    with pytest.raises(InputError, match="body 'dot' cannot move: it has no inertia left for turning about z"):
+        forward(scene, end=0.1, output_step=0.1)
+
+
+def test_a_needle_that_swings_in_a_plane_is_looked_at_in_space_without_inertia_about_its_axis():
+    """What a run in the plane computes is also counted, balanced and linearised, as what the closed form says."""
+    needle = rigid_body(
+        "needle", mass=1.0, inertia=(0, 1 / 12, 1 / 12), centre_of_mass=(0.5, 0, 0), points={"a": (0, 0, 0)}
+    )
+    hung = Body("needle", needle, rotation=(0, 0, -1.2))
+    hinge = Joint("hinge", "revolute", "ground.O", "needle.a")
+    scene = Scene((hung,), (hinge,), ground={"O": (0, 0, 0)}, gravity=(0, -9.81, 0))
+    found = mobility(scene)
+    assert (found.degrees_of_freedom, found.redundant, found.free[0].name) == (1, (), "hinge.angle")
+    swing = linearise(scene_at(scene, static(scene))).eigenvalues
+    assert np.abs(swing.imag).max() == pytest.approx(np.sqrt(1.5 * 9.81), rel=1e-6)
 
 
 # ---- the command line ---------------------------------------------------------------------------------------------------

@@ -100,10 +100,14 @@ def test_a_moving_scene_is_linearised_by_differences():
 @pytest.mark.parametrize(
     ("counts", "words"),
     [
-        ((104, 101, 2), "3 rigid degrees of freedom, 2 redundant rows; 101 elastic coordinates"),
-        ((1, 0, 1), "1 rigid degree of freedom, 1 redundant row"),
-        ((0, 0, 0), "0 rigid degrees of freedom"),
-        ((6, 8, 0), "0 rigid degrees of freedom; 8 elastic coordinates, which joints and drivers deform in 2 ways"),
+        ((104, 3, 101, 2), "3 rigid degrees of freedom, 2 redundant rows; 101 elastic coordinates"),
+        ((1, 1, 0, 1), "1 rigid degree of freedom, 1 redundant row"),
+        ((0, 0, 0, 0), "0 rigid degrees of freedom"),
+        (
+            (10, 1, 12, 0),
+            "1 rigid degree of freedom; 12 elastic coordinates, which joints and drivers deform in 3 ways",
+        ),
+        ((6, 0, 8, 0), "0 rigid degrees of freedom; 8 elastic coordinates, which joints and drivers deform in 2 ways"),
     ],
 )
 def test_mobility_in_words(counts, words):

@@ -90,7 +90,8 @@ def test_a_driver_too_many_is_found_in_singular_positions_too(angle):
     drivers = tuple(Driver(f"d{k}", f"foot{k}", formula(f"{angle} + 0.1*t")) for k in range(2))
     assert mobility(replace(scene, drivers=drivers)).overdriven == ("d0", "d1")
     with pytest.raises(
-        InputError, match="driver 'd0' prescribes a motion that the joints and other drivers already fix"
+        InputError,
+        match="driver 'd0' prescribes a motion that the joints and other drivers already fix; leave out 'd0' or 'd1'",
     ):
         assemble(replace(scene, drivers=drivers))
     assert assemble(replace(scene, drivers=drivers[:1])).degrees_of_freedom == 0

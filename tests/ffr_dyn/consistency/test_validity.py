@@ -112,6 +112,15 @@ def test_every_analysis_tells_of_a_body_that_bends_too_far(arm, name):
     assert "6 parts would do" in told[0]
 
 
+def test_a_body_that_is_stretched_is_not_told_to_be_cut_into_parts(arm):
+    """Under 0.3 EA along it a bar is 0.3 longer, in however many parts."""
+    pulled = fd.Load("pull", "arm.tip", force=(0.3 * SOFT.E * 0.02 * 0.01, 0, 0))
+    (told,) = [note for note in fd.static(replace(arm[0], loads=(pulled,))).attributes["notes"] if "deforms by" in note]
+    assert "deforms by up to 0.3 of its size" in told
+    assert "two of its interfaces are 0.3 of their distance farther apart" in told
+    assert "parts would do" not in told
+
+
 def test_a_linearisation_tells_it_too(arm):
     assert sum("turns within itself" in note for note in fd.linearise(arm[1]).notes) == 1
 

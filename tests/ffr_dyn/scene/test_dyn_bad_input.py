@@ -51,7 +51,7 @@ def scene(tmp_path):
         ),
         (SCENE.replace("output_step = 0.01", "output_step = -1"), ["analysis.output_step", "greater than 0"]),
         (SCENE.replace('i = "ground.O"', 'i = "ground"'), ["marker 'ground'", "write BODY.POINT"]),
-        (loaded("1 m"), ["loads.push.force.1", "'m' does not fit", "given in N"]),
+        (loaded("1 m"), ["loads.push.force.2", "'m' does not fit", "given in N"]),
         (SCENE.replace("end = 0.1", 'kind = "forwrd"\nend = 0.1'), ["no kind 'forwrd'", "did you mean 'forward'?"]),
         (SCENE.replace("end = 0.1", 'method = "ros5"\nend = 0.1'), ["analysis.method", "did you mean 'ros3'?"]),
         (

@@ -133,7 +133,7 @@ interfaces = {a = {}}
     parts = load_body(tmp_path / "b.ffr").provenance["reduction"]["parts"]
     assert parts[0] == {"type": "Polynomials", "degree": 4}
     (tmp_path / "bar.toml").write_text(text.replace("degree = 4", "degree = 0"))
-    with pytest.raises(InputError, match=r"reduction\.0\.degree: .*greater than or equal to 1"):
+    with pytest.raises(InputError, match=r"reduction\.1\.degree: .*greater than or equal to 1"):
         fp.read_structure(tmp_path / "bar.toml")
 
 

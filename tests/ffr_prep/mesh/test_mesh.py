@@ -435,8 +435,49 @@ def test_plane_meshes_are_refused(tmp_path):
 
 def test_surfaces_alone_are_refused(tmp_path):
     meshio.Mesh(np.eye(3), [("triangle", [[0, 1, 2]])]).write(tmp_path / "s.vtu")
-    with pytest.raises(InputError, match="no volume elements; only solids"):
+    with pytest.raises(InputError, match=r"no volume elements; bodies are made of solids.*ffr-prep reduce-structure"):
         read_mesh(tmp_path / "s.vtu")
+
+
+SAVED_WITHOUT_SURFACES = """$MeshFormat
+4.1 0 8
+$EndMeshFormat
+$PhysicalNames
+1
+3 1 "part"
+$EndPhysicalNames
+$Entities
+0 0 1 1
+1 0 0 0 1 1 1 0 0
+1 0 0 0 1 1 1 1 1 0
+$EndEntities
+$Nodes
+1 4 1 4
+3 1 0 4
+1
+2
+3
+4
+0 0 0
+1 0 0
+0 1 0
+0 0 1
+$EndNodes
+$Elements
+1 1 1 1
+3 1 4 1
+1 1 2 3 4
+$EndElements
+"""
+
+
+def test_groups_without_elements_of_their_own_are_not_told_of(tmp_path):
+    """gmsh saves the surfaces of a mesh with named volumes alone as surfaces without elements, which nobody has named."""
+    (tmp_path / "part.msh").write_text(SAVED_WITHOUT_SURFACES)
+    mesh = read_mesh(tmp_path / "part.msh")
+    assert list(mesh.volume_groups) == ["part"]
+    assert mesh.notes == ()
+    assert mesh.face_groups == {}
 
 
 def test_what_is_left_out_is_noted(tmp_path):

@@ -31,6 +31,7 @@ def reduces(wrong: str, right: str = "", **files: str) -> Case:
     return words(f"{REDUCE} {wrong}", f"{REDUCE} {right}", **files)
 
 
+GEOMETRY = "reduce part.geo --size 0.1 --interface surface_1 --modes 1 --linear -o new.ffr"
 OPTIONS = [
     words("modes body.ffr --modes x -o out", "modes body.ffr --modes 1-1 -o out"),
     words("modes body.ffr --modes 9 -o out", "info body.ffr"),
@@ -54,6 +55,10 @@ OPTIONS = [
     reduces("--accuracy 10;20;3", "--modes 2"),
     reduces("--accuracy 10,20", "--frequency 2000"),
     words("reduce block.inp --interface LEFT -o scene.toml", REDUCE),
+    words(
+        "reduce part.geo --interface surface_1 -o new.ffr",
+        "reduce part.geo --interface surface_1 --material steel -o new.ffr",
+    ),
     words("faces block.inp --page page.png", "faces block.inp"),
     words("modes body.ffr -o block.inp", "info body.ffr"),
 ]

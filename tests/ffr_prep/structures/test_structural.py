@@ -26,9 +26,20 @@ from ffr_prep.reduction.methods.craig_bampton import CraigBampton
 from ffr_prep.reduction.methods.eigenmodes import Eigenmodes
 from ffr_prep.structures.beams import axis_functions, beams, field, mass_points, stiffness, undeformed
 from ffr_prep.structures.element_families import beam_elements, families
-from ffr_prep.structures.frame import Frame, Member, check_frame, group_nodes, joined, named, overlap_doubts, polyline
+from ffr_prep.structures.frame import (
+    Frame,
+    Member,
+    Shell,
+    check_frame,
+    group_nodes,
+    joined,
+    named,
+    overlap_doubts,
+    polyline,
+    thickness_doubts,
+)
 from ffr_prep.structures.interfaces import couple_frame, tie
-from ffr_prep.structures.model import assemble_frame
+from ffr_prep.structures.model import assemble_frame, from_frame
 from ffr_prep.structures.sections import (
     circle,
     general,
@@ -543,6 +554,22 @@ def test_members_that_lie_on_one_another_are_told():
     assert plates.startswith("4 pairs of plates lie on one another")
     frame = named(joined(line, coarse), a=(0, 0, 0))
     assert fp.from_frame(frame, [InterfaceRegion("a")]).record["warnings"] == [beams]
+
+
+def test_sizes_in_millimetres_are_told():
+    """A section deeper than the frame is long and a sheet too thick for a plate are doubted; those that are meant are not."""
+    sheet = [(0, 0, 0), (0.4, 0, 0), (0.4, 0.3, 0), (0, 0.3, 0)]
+
+    def frame(thickness: float, d: float, t: float) -> Frame:
+        line = polyline([(0, 0, 0), (0.4, 0, 0)], Member(tube(d, t), STEEL), elements=2)
+        return joined(line, fp.panel(sheet, Shell(thickness, STEEL), elements=(2, 2)))
+
+    assert thickness_doubts(frame(0.003, 0.04, 0.002)) == []
+    assert from_frame(frame(0.003, 0.04, 0.002)).record["warnings"] == []
+    deep, thick = from_frame(frame(3.0, 40.0, 2.0)).record["warnings"]
+    assert "tube 40 x 2 m is" in deep
+    assert "the beams of the frame reach 0.4 m: are the sizes of the section in millimetres?" in deep
+    assert thick.startswith("a sheet of steel is 3 m thick and 0.5 m across, too thick for a plate")
 
 
 def test_closed_polyline():
