@@ -851,6 +851,10 @@ INPUT = [
         lambda: fd.response(HINGED, input="hinge.moment", outputs=["bar.b.position.x"], frequencies=[1.0]),
     ),
     Case(
+        lambda: fd.response(DRIVEN, input="d.angle", outputs=["d.moment.z"], frequencies=[1.0]),
+        lambda: fd.response(DRIVEN, input="d.angle", outputs=["d.effort"], frequencies=[1.0]),
+    ),
+    Case(
         lambda: fd.response(SPRUNG, input="base.y.velocity", outputs=["bar.b.position.y"], frequencies=[0.0, 1.0]),
         lambda: fd.response(SPRUNG, input="base.y.velocity", outputs=["bar.b.position.y"], frequencies=[0.5, 1.0]),
     ),
