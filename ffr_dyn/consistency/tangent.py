@@ -20,6 +20,7 @@ from ffr_dyn.equations.inertia import kept_integrals
 from ffr_dyn.equations.layout import moved, to_body_axes, to_global_axes
 from ffr_dyn.equations.spinning import by_deflections
 from ffr_dyn.equations.statics import balance, damping
+from ffr_dyn.functions.differences import differences
 from ffr_dyn.functions.rotation import rotation_matrix, skew
 from ffr_prep.common.arrays import Array
 
@@ -93,19 +94,9 @@ def rates(near: Chart, x: Array, v: Array) -> Array:
 
 def derivative(function: Callable[[Array], Array], steps: Array) -> tuple[Array, float]:
     """d function / d deviation at zero (K, len(steps)), and its error: the last change by halving the steps, relative."""
-    coarse, fine = (_central(function, factor * steps) for factor in (1.0, 0.5))
-    best = (4 * fine - coarse) / 3
+    best, error = differences(function, steps, range(steps.size))
     scale = np.abs(best).max(initial=0.0)
-    return best, float(np.abs(fine - best).max(initial=0.0) / scale) if scale > 0 else 0.0
-
-
-def _central(function: Callable[[Array], Array], steps: Array) -> Array:
-    columns = []
-    for k, h in enumerate(steps):
-        deviation = np.zeros(steps.size)
-        deviation[k] = h
-        columns.append((function(deviation) - function(-deviation)) / (2 * h))
-    return np.array(columns).T
+    return best, float(error.max(initial=0.0) / (3 * scale)) if scale > 0 else 0.0
 
 
 def at_rest(near: Chart) -> bool:
