@@ -108,7 +108,7 @@ def state_matrix(near: Chart) -> tuple[Array, float]:
     """A (2 d, 2 d) with d/dt (y, z) = A (y, z), and its error, relative: by differences, or of a scene at rest exactly."""
     d = near.steps.size
     if at_rest(near):
-        K, D = _at_rest(near)
+        K, D = matrices_at_rest(near)
         return np.block([[np.zeros((d, d)), np.eye(d)], [-near.Z.T @ K @ near.Z, -near.Z.T @ D @ near.Z]]), 0.0
 
     def at(deviation: Array) -> Array:
@@ -117,7 +117,7 @@ def state_matrix(near: Chart) -> tuple[Array, float]:
     return derivative(at, np.concatenate([near.steps, near.steps / _period(near)]))
 
 
-def _at_rest(near: Chart) -> tuple[Array, Array]:
+def matrices_at_rest(near: Chart) -> tuple[Array, Array]:
     """(V, V) stiffness and damping: less the derivatives of forces - jacobian^T lam - M acceleration, in body axes."""
     system, time, x = near.at.system, near.time, near.x
     scene, place = system.scene, system.layout

@@ -23,7 +23,7 @@ from ffr_dyn.functions.time_functions import polynomial
 from ffr_dyn.integrators import RK4
 from ffr_dyn.results.file import load_result, save_result
 from ffr_dyn.scene.drivers import Driver
-from ffr_dyn.scene.forces import JointSpring, Load, SpringDamper
+from ffr_dyn.scene.forces import Bushing, JointSpring, Load, SpringDamper
 from ffr_dyn.scene.joints import Joint
 from ffr_dyn.scene.scene import Body, Scene
 from ffr_dyn.scene.sensors import Measurement
@@ -234,3 +234,23 @@ def test_a_spring_that_is_not_stretched_but_by_rounding_is_an_equilibrium():
     assert not linearise(scene).notes
     away = replace(scene, forces=[replace(spring, free=0.3 + 1e-6)])
     assert "no equilibrium" in linearise(away).notes[0]
+
+
+@pytest.mark.parametrize(("stiffness", "damping"), [(1e6, 1e2), (1e15, 0.0), (1e6, 1e9)])
+def test_a_slow_pendulum_beside_what_is_fast(stiffness, damping):
+    """A load of a crane on 30 m, 0.57 rad/s, beside a small part on a mount. Before, it was told to be free beside a mount of
+    1e7 rad/s, or a damper that brakes in 1e-8 s."""
+    load = rigid_body("load", mass=1000.0, inertia=(1e3,) * 3, points={"top": (0, 30, 0)})
+    part = rigid_body("part", mass=0.1, inertia=(0.1,) * 3, points={"c": (0, 0, 0)})
+    scene = Scene(
+        [Body("load", load, position=(0, -30, 0)), Body("part", part)],
+        [Joint("hook", "universal", "ground.O", "load.top", axis=(1, 0, 0), axis_j=(0, 0, 1))],
+        forces=[Bushing("mount", "ground.O", "part.c", [stiffness] * 6, [damping] * 6)],
+        ground={"O": (0, 0, 0)}, gravity=(0, -9.81, 0),
+    )  # fmt: skip
+    found = linearise(scene)
+    assert found.free == 0
+    rate = np.sqrt(1000 * 9.81 * 30 / (1e3 + 1000 * 30**2))
+    slow = found.eigenvalues[np.abs(np.abs(found.eigenvalues) / rate - 1) < 1e-5]
+    assert len(slow) == 4
+    assert np.abs(slow.real).max() < 1e-5
