@@ -229,8 +229,7 @@ def linearised(
     screws = screws_of(where[1], assembled.x, assembled.v)
     seen, whirl, _ = whirls(*where, screws, assembled.x, rates_of(solved.values, len(parts), solved.shift), parts)
     ways = ways_of(seen, whirl)
-    rates_seen = np.hypot(solved.values.real, np.where([bool(way) for way in ways], seen, solved.values.imag))
-    leading = in_words(*where, assembled.x, near.M, modes, rates_seen, ways)
+    leading = in_words(*where, assembled.x, near.M, modes, _rates_of_shapes(near, A, solved, seen, ways), ways)
     names = tuple(item if isinstance(item, str) else item.name for item in inputs)
     evaluate(at, time, assembled.x, assembled.v)
     unit = main_parts(parts) / np.sqrt(np.maximum((np.abs(solved.parts) ** 2).sum(axis=(0, 1)), 1e-300))
@@ -282,6 +281,17 @@ def _solved(near: Chart, steady: Steady | None, rounding: Array | None) -> tuple
     values, vectors = np.linalg.eig(A)
     order = np.lexsort((np.sign(values.imag), np.round(np.abs(values), 9)))
     return A, error, Modes(values[order], vectors[None, :d, order], 0, 0.0)
+
+
+def _rates_of_shapes(near: Chart, A: Array, solved: Modes, seen: Array, ways: Sequence[str]) -> Array:
+    """(2d,) [rad/s] by which modes are counted: from the ground; of what decays at rest, which has two rates for one shape,
+    that of the shape without dampers."""
+    rates: Array = np.hypot(solved.values.real, np.where([bool(way) for way in ways], seen, solved.values.imag))
+    if not at_rest(near):
+        return rates
+    d, y = near.steps.size, solved.parts[0]
+    strain = -(y.conj() * (A[d:, :d] @ y)).sum(axis=0).real / np.maximum((np.abs(y) ** 2).sum(axis=0), 1e-300)
+    return np.where(solved.values.imag == 0, np.sqrt(np.abs(strain)), rates)
 
 
 def _notes(near: Chart, steady: Steady | None, A: Array, rounding: Array | None) -> list[str]:

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from ffr_gallery.bodies import beam
 from scipy.linalg import eigh
 from test_analyses_kinematic import slider_crank
 from test_analyses_static import flexible, hanging
@@ -254,3 +255,15 @@ def test_a_slow_pendulum_beside_what_is_fast(stiffness, damping):
     slow = found.eigenvalues[np.abs(np.abs(found.eigenvalues) / rate - 1) < 1e-5]
     assert len(slow) == 4
     assert np.abs(slow.real).max() < 1e-5
+
+
+@pytest.mark.parametrize("ratio", [1.0, 2.5, 20.0])
+def test_an_overdamped_mode_has_one_name_for_both_of_its_decays(ratio):
+    """Of a free beam: w (ratio -+ root(ratio^2 - 1)) of each bending. Before, they were counted as modes of their own."""
+    found = linearise(Scene([Body("rod", beam("rod", 1.0, 2.0, 50.0, 3), damping=ratio)]))
+    undamped = linearise(Scene([Body("rod", beam("rod", 1.0, 2.0, 50.0, 3))]))
+    w = np.abs(undamped.eigenvalues[undamped.free :])[::2]
+    for name, rate in zip(("first", "second", "third"), w, strict=True):
+        own = [k for k, leading in enumerate(found.leading) if leading == f"rod: {name} bending, y"]
+        expected = -rate * (ratio + np.sqrt(ratio**2 - 1) * np.array([-1, 1]))
+        np.testing.assert_allclose(found.eigenvalues[own], expected, rtol=1e-5)
