@@ -26,11 +26,11 @@ from ffr_dyn.compile.engine import with_model
 from ffr_dyn.consistency.assemble import assemble, seen_in_space
 from ffr_dyn.consistency.doubts import checked
 from ffr_dyn.consistency.evaluation import Evaluator, evaluate, evaluator
-from ffr_dyn.consistency.tangent import Chart, at_rest, chart, derivative, rates, sizes, state, state_matrix
+from ffr_dyn.consistency.tangent import STEP, Chart, at_rest, chart, derivative, rates, sizes, state, state_matrix
 from ffr_dyn.equations.layout import to_global_axes
 from ffr_dyn.kernels.tables import LAW
-from ffr_dyn.linear.eigen import eigen
-from ffr_dyn.linear.matrices import Modes, modes_of, reduced
+from ffr_dyn.linear.eigen import NULL, eigen
+from ffr_dyn.linear.matrices import Modes, graded, modes_of, reduced
 from ffr_dyn.linear.matrices import state_matrix as steady_matrix
 from ffr_dyn.linear.prestrained import prestrained, told
 from ffr_dyn.linear.spectrum import main_parts, rates_of
@@ -50,7 +50,6 @@ from ffr_prep.common.errors import ComputationError, InputError
 SHOWN = 12  # modes that a command prints
 BASE = {"base.x": 0, "base.y": 1, "base.z": 2}  # inputs: accelerations of the ground
 SAME = 1e-6  # of matrices at two angles of a steady motion, relative
-ROUNDED = 1e-7  # times this: of a size or a radian, by which an equilibrium in floating point is off
 STATIONARY = 1e-6  # of the accelerations in moving axes, relative to those of the applied forces
 
 
@@ -220,7 +219,8 @@ def linearised(
     if near.steps.size == 0:
         raise InputError("nothing is free to move: joints and drivers fix every motion; linearise with fewer drivers")
     steady = steady_about(near, inputs)
-    A, error, solved = _solved(_without_inputs(near, inputs), steady)
+    near, rounding = graded(near, _without_inputs(near, inputs))
+    A, error, solved = _solved(_without_inputs(near, inputs), steady, rounding)
     B, C, D = inputs_and_outputs(near, scene, inputs, outputs)
     parts = near.Z @ solved.parts
     modes = main_parts(parts)
@@ -229,15 +229,14 @@ def linearised(
     screws = screws_of(where[1], assembled.x, assembled.v)
     seen, whirl, _ = whirls(*where, screws, assembled.x, rates_of(solved.values, len(parts), solved.shift), parts)
     ways = ways_of(seen, whirl)
-    rates_seen = np.hypot(solved.values.real, np.where([bool(way) for way in ways], seen, solved.values.imag))
-    leading = in_words(*where, assembled.x, near.M, modes, rates_seen, ways)
+    leading = in_words(*where, assembled.x, near.M, modes, _rates_of_shapes(near, A, solved, seen, ways), ways)
     names = tuple(item if isinstance(item, str) else item.name for item in inputs)
     evaluate(at, time, assembled.x, assembled.v)
     unit = main_parts(parts) / np.sqrt(np.maximum((np.abs(solved.parts) ** 2).sum(axis=(0, 1)), 1e-300))
     strained = prestrained(*where, assembled.x, solved.values, unit)
     notes = (
         *assembled.notes,
-        *_notes(near, steady, solved.values),
+        *_notes(near, steady, A, rounding),
         *solved.notes,
         *checked("linearise", assembled, at.record),
     )
@@ -264,8 +263,9 @@ def _without_inputs(near: Chart, inputs: tuple[Effort | str, ...]) -> Chart:
     return replace(near, at=replace(near.at, engine=replace(near.at.engine, system=plain)))
 
 
-def _solved(near: Chart, steady: Steady | None) -> tuple[Array, float, Modes]:
-    """A, its error, and the modes; about a steady motion and at rest from exact matrices."""
+def _solved(near: Chart, steady: Steady | None, rounding: Array | None) -> tuple[Array, float, Modes]:
+    """A, its error, and the modes; about a steady motion and at rest from exact matrices, at rest with the rounding (d,) of
+    the stiffness."""
     if steady is not None:
         steady = replace(steady, Z=near.Z)
         return steady_matrix(steady, reduced(steady)), 0.0, modes_of(steady)
@@ -276,24 +276,36 @@ def _solved(near: Chart, steady: Steady | None) -> tuple[Array, float, Modes]:
             f"at t = {near.time:.6g} s a force has no finite value beside the state that is linearised; look at its function"
         )
     if at_rest(near):
-        rest = eigen(-A[d:, :d], -A[d:, d:])
+        rest = eigen(-A[d:, :d], -A[d:, d:], rounding)
         return A, error, Modes(rest.values, rest.vectors[None], rest.free, 0.0)
     values, vectors = np.linalg.eig(A)
     order = np.lexsort((np.sign(values.imag), np.round(np.abs(values), 9)))
     return A, error, Modes(values[order], vectors[None, :d, order], 0, 0.0)
 
 
-def _notes(near: Chart, steady: Steady | None, values: Array) -> list[str]:
+def _rates_of_shapes(near: Chart, A: Array, solved: Modes, seen: Array, ways: Sequence[str]) -> Array:
+    """(2d,) [rad/s] by which modes are counted: from the ground; of what decays at rest, which has two rates for one shape,
+    that of the shape without dampers."""
+    rates: Array = np.hypot(solved.values.real, np.where([bool(way) for way in ways], seen, solved.values.imag))
+    if not at_rest(near):
+        return rates
+    d, y = near.steps.size, solved.parts[0]
+    strain = -(y.conj() * (A[d:, :d] @ y)).sum(axis=0).real / np.maximum((np.abs(y) ** 2).sum(axis=0), 1e-300)
+    return np.where(solved.values.imag == 0, np.sqrt(np.abs(strain)), rates)
+
+
+def _notes(near: Chart, steady: Steady | None, A: Array, rounding: Array | None) -> list[str]:
+    """Of the steady motion; of another state whether it is an equilibrium, as far as the rounding of positions tells it."""
     if steady is not None:
         return list(steady.notes)
-    at, place = near.at, near.at.system.layout
+    at, place, d = near.at, near.at.system.layout, near.steps.size
     v = to_global_axes(place, near.x, near.V)
-    left = near.Z @ rates(near, near.x, v)[near.steps.size :] / sizes(at)
+    left = rates(near, near.x, v)[d:]
+    if rounding is None:
+        rounding = np.full(d, NULL * max(1.0, float(np.abs(A[d:, :d]).max(initial=0.0))))
+    left = near.Z @ np.where(np.abs(left) > rounding * near.steps / STEP, left, 0.0) / sizes(at)
     applied = np.linalg.solve(near.M, evaluate(at, near.time, near.x, v).force) / sizes(at)
-    rounding = ROUNDED * max(
-        1.0, float(np.abs(values).max(initial=0.0)) ** 2
-    )  # of springs, also where they hold a load
-    if np.abs(left).max() <= STATIONARY * max(rounding, float(np.abs(applied).max()), float(np.abs(near.V).max()) ** 2):
+    if np.abs(left).max() <= STATIONARY * max(float(np.abs(applied).max()), float(np.abs(near.V).max()) ** 2):
         return []
     return ["the state is no equilibrium and no steady rotation: the eigenvalues describe its next moment only"]
 

@@ -20,6 +20,7 @@ from ffr_dyn.equations.inertia import kept_integrals
 from ffr_dyn.equations.layout import moved, to_body_axes, to_global_axes
 from ffr_dyn.equations.spinning import by_deflections
 from ffr_dyn.equations.statics import balance, damping
+from ffr_dyn.functions.differences import differences
 from ffr_dyn.functions.rotation import rotation_matrix, skew
 from ffr_prep.common.arrays import Array
 
@@ -93,19 +94,9 @@ def rates(near: Chart, x: Array, v: Array) -> Array:
 
 def derivative(function: Callable[[Array], Array], steps: Array) -> tuple[Array, float]:
     """d function / d deviation at zero (K, len(steps)), and its error: the last change by halving the steps, relative."""
-    coarse, fine = (_central(function, factor * steps) for factor in (1.0, 0.5))
-    best = (4 * fine - coarse) / 3
+    best, error = differences(function, steps, range(steps.size))
     scale = np.abs(best).max(initial=0.0)
-    return best, float(np.abs(fine - best).max(initial=0.0) / scale) if scale > 0 else 0.0
-
-
-def _central(function: Callable[[Array], Array], steps: Array) -> Array:
-    columns = []
-    for k, h in enumerate(steps):
-        deviation = np.zeros(steps.size)
-        deviation[k] = h
-        columns.append((function(deviation) - function(-deviation)) / (2 * h))
-    return np.array(columns).T
+    return best, float(error.max(initial=0.0) / (3 * scale)) if scale > 0 else 0.0
 
 
 def at_rest(near: Chart) -> bool:
@@ -117,7 +108,7 @@ def state_matrix(near: Chart) -> tuple[Array, float]:
     """A (2 d, 2 d) with d/dt (y, z) = A (y, z), and its error, relative: by differences, or of a scene at rest exactly."""
     d = near.steps.size
     if at_rest(near):
-        K, D = _at_rest(near)
+        K, D = matrices_at_rest(near)
         return np.block([[np.zeros((d, d)), np.eye(d)], [-near.Z.T @ K @ near.Z, -near.Z.T @ D @ near.Z]]), 0.0
 
     def at(deviation: Array) -> Array:
@@ -126,7 +117,7 @@ def state_matrix(near: Chart) -> tuple[Array, float]:
     return derivative(at, np.concatenate([near.steps, near.steps / _period(near)]))
 
 
-def _at_rest(near: Chart) -> tuple[Array, Array]:
+def matrices_at_rest(near: Chart) -> tuple[Array, Array]:
     """(V, V) stiffness and damping: less the derivatives of forces - jacobian^T lam - M acceleration, in body axes."""
     system, time, x = near.at.system, near.time, near.x
     scene, place = system.scene, system.layout

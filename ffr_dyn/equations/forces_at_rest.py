@@ -17,12 +17,16 @@ from ffr_dyn.equations.jets import SIZE, coordinates
 from ffr_dyn.equations.layout import moved, to_global_axes
 from ffr_dyn.equations.placed import Sums, pair
 from ffr_dyn.equations.state_view import StateView
+from ffr_dyn.functions.differences import differences as differences_by
 from ffr_dyn.functions.rotation import skew
 from ffr_dyn.scene.forces.force import Force
 from ffr_dyn.scene.forces.places import AtMarker, OnBody, OnJoint
 from ffr_prep.common.arrays import Array
 
-STEP = 1e-6  # m, rad: of differences of laws by what they are functions of
+STEP = 1e-6  # m, rad: of differences of laws by what they are functions of, the first
+FAR = (
+    1e-3  # of a distance or coordinate, in metres or radians, from where steps grow with it: of 1e7 m rounding is 1e-9
+)
 
 
 @dataclass(frozen=True)
@@ -102,7 +106,8 @@ def _add_on_coordinates(
     watched = Watched(now.scene, now.place, now.t, now.x, now.v, [])
     still, gradients = np.zeros(c.size), np.array([jet.first for jet in jets])
     given = law_on(force, watched, c, still)
-    slopes = differences(lambda step: law_on(force, now, c + step, still), range(c.size), c.size)
+    reach = float(np.abs(c).max())
+    slopes = differences(lambda step: law_on(force, now, c + step, still), range(c.size), c.size, reach)
     second = gradients.T @ slopes @ gradients + sum(f * jet.second for f, jet in zip(given, jets, strict=True))
     total.add_on_pair(ends, given @ gradients, second)
     if watched.looks:
@@ -121,17 +126,14 @@ def _by_state(now: At, law: Callable[[At], Array], columns: Iterable[int]) -> Ar
     def at(step: Array) -> Array:
         return law(replace(now, x=moved(now.place, now.x, step)))
 
-    return differences(at, columns, now.place.v_size)
+    far = max((float(np.abs(now.x[now.place.R(b)]).max()) for b in range(len(now.place.n))), default=0.0)
+    return differences(at, columns, now.place.v_size, far)
 
 
-def differences(function: Callable[[Array], Array], columns: Iterable[int], size: int) -> Array:
-    """(K, size) derivative of K numbers at zero by `size` others, of these the columns, by central differences."""
-    found = np.zeros((np.size(function(np.zeros(size))), size))
-    for k in columns:
-        step = np.zeros(size)
-        step[k] = STEP
-        found[:, k] = np.ravel(function(step) - function(-step)) / (2 * STEP)
-    return found
+def differences(function: Callable[[Array], Array], columns: Iterable[int], size: int, reach: float = 1.0) -> Array:
+    """(K, size) derivative of K numbers at zero by `size` others, of these the columns, which are added to what is as large
+    as `reach`."""
+    return differences_by(function, np.full(size, STEP * max(1.0, FAR * reach)), columns)[0]
 
 
 # ---- damping --------------------------------------------------------------------------------------------------------

@@ -2,7 +2,8 @@
 
 A motion that nothing holds, such as a free spin, has the eigenvalue zero twice, with one vector: rounding makes of
 such a pair a slow growth and a slow decay. So null spaces are divided out one after the other (a staircase) before
-the rest is solved. (Golub & Van Loan 2013, section 7.6.)
+the rest is solved. (Golub & Van Loan 2013, section 7.6.) What is free has no stiffness: beside the largest, not beside a
+damper, which may be as large as it likes. Its second zero, and no other, is found among what is left.
 """
 
 from __future__ import annotations
@@ -14,6 +15,8 @@ import numpy as np
 from ffr_prep.common.arrays import Array
 
 NULL = 1e-13  # of a stiffness relative to the largest: rounding
+SLOWEST = 1.0  # 1/s: the least that rounding of a stiffness is measured by
+FLAT = 1e-10  # of the fastest rate: the least that coordinates are scaled by
 
 
 @dataclass(frozen=True)
@@ -25,34 +28,44 @@ class Eigen:
     free: int
 
 
-def eigen(K: Array, C: Array) -> Eigen:
-    """Of stiffness K and damping C (d, d), gyroscopic terms included."""
+def eigen(K: Array, C: Array, rounding: Array | None = None) -> Eigen:
+    """Of stiffness K and damping C (d, d), gyroscopic terms included.
+
+    rounding : (d,) of the diagonal of K, below which it is none; by default `NULL` of the largest. Where K is nearly diagonal
+               with small entries that are right to their own size, these stay so.
+    """
     d = len(K)
-    stiffness, U = np.linalg.eigh(0.5 * (K + K.T))
-    largest = max(np.sqrt(np.abs(stiffness).max(initial=0.0)), np.abs(C).max(initial=0.0)) or 1.0
+    U = np.linalg.eigh(0.5 * (K + K.T))[1]
+    stiffness = np.einsum("ij,ij->j", U, K @ U)
     circulating, C = U.T @ (0.5 * (K - K.T)) @ U, U.T @ C @ U
-    K = np.diag(np.where(np.abs(stiffness) > NULL * largest**2, stiffness, 0.0))
-    K += np.where(np.abs(circulating) > NULL * largest**2, circulating, 0.0)
-    scale = np.maximum(np.sqrt(np.abs(stiffness)), largest * np.sqrt(NULL))  # y times its own frequency
+    turning = 0.5 * np.abs(C - C.T).max(initial=0.0)
+    rate = np.sqrt(max(np.abs(stiffness).max(initial=0.0), np.abs(circulating).max(initial=0.0), turning**2, SLOWEST))
+    none = np.full(d, NULL * rate**2) if rounding is None else rounding @ U**2
+    K = np.diag(np.where(np.abs(stiffness) > none, stiffness, 0.0))
+    K += np.where(np.abs(circulating) > np.sqrt(np.outer(none, none)), circulating, 0.0)
+    scale = np.sqrt(np.maximum(np.maximum(np.abs(stiffness), none), (FLAT * rate) ** 2))  # y times its own frequency
+    still = _null_vectors(K, scale)
     A = np.zeros((2 * d, 2 * d))
     A[:d, d:], A[d:, :d], A[d:, d:] = np.diag(scale), -K / scale, -C
-    rest, stages = _without_null_space(A, NULL * largest)
+    rest, stages = _without_null_space(A, NULL * max(rate, np.abs(C).max(initial=0.0)), len(still))
     values, vectors = np.linalg.eig(rest)
     for Q, across in reversed(stages):
         vectors = Q @ np.concatenate([across @ vectors / np.where(values, values, 1.0), vectors])
     free = 2 * d - values.size
     order = np.lexsort((np.sign(values.imag), np.round(np.abs(values), 9)))
-    still = _null_vectors(K, NULL * largest**2, free)
-    shapes = np.concatenate([still, (vectors[:d, order].T / scale).T], axis=1)
+    shapes = (vectors[:d, order].T / scale).T
+    if free:
+        shapes = np.concatenate([still[np.arange(free) % len(still)].T, shapes], axis=1)
     return Eigen(np.concatenate([np.zeros(free), values[order]]), U @ shapes, free)
 
 
-def _without_null_space(A: Array, tolerance: float) -> tuple[Array, list[tuple[Array, Array]]]:
-    """The rest of A when its zero eigenvalues are divided out, and the steps to vectors of all of it."""
-    stages = []
-    while len(A):
+def _without_null_space(A: Array, tolerance: float, most: int) -> tuple[Array, list[tuple[Array, Array]]]:
+    """The rest of A when its zero eigenvalues, `most` with vectors of their own, are divided out, and the steps to vectors of
+    all of it."""
+    stages, null = [], most
+    while len(A) and null:
         _, sizes, W = np.linalg.svd(A)
-        null = int((sizes <= tolerance).sum())
+        null = min(int((sizes <= tolerance).sum()), null)
         if not null:
             break
         Q = np.concatenate([W[len(A) - null :], W[: len(A) - null]]).T
@@ -62,10 +75,9 @@ def _without_null_space(A: Array, tolerance: float) -> tuple[Array, list[tuple[A
     return A, stages
 
 
-def _null_vectors(K: Array, tolerance: float, count: int) -> Array:
-    """(d, count) vectors that K takes to zero, each as often as it is needed."""
-    if not count:
-        return np.zeros((len(K), 0))
-    _, sizes, W = np.linalg.svd(K)
-    null = W[sizes <= max(tolerance, sizes.min())]
-    return null[np.arange(count) % len(null)].T
+def _null_vectors(K: Array, scale: Array) -> Array:
+    """(n, d) vectors that K takes to zero, for coordinates of frequencies scale (d,)."""
+    _, sizes, W = np.linalg.svd(K / scale / scale[:, None])
+    null = W[sizes <= NULL] / scale
+    found: Array = null / np.linalg.norm(null, axis=1, keepdims=True)
+    return found

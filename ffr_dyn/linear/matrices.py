@@ -9,18 +9,21 @@ with the angle of the turning bodies they are the means of a turn, and the modes
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ffr_dyn.consistency.evaluation import evaluate
+from ffr_dyn.consistency.tangent import STEP, Chart, at_rest, matrices_at_rest, sizes
 from ffr_dyn.equations.layout import to_body_axes
 from ffr_dyn.functions.rotation import skew
-from ffr_dyn.linear.eigen import Eigen, eigen
+from ffr_dyn.linear.eigen import NULL, SLOWEST, Eigen, eigen
 from ffr_dyn.linear.hill import Varying, hill
 from ffr_dyn.linear.steady_state import Steady
 from ffr_dyn.linear.whirl import parted
 from ffr_prep.common.arrays import Array
 
+SKEW = 1e-3  # of a stiffness: what has no potential, beside which its motions are still those of an energy
 TOLD = 1e-4  # of frequencies that more harmonics would change, relative
 CUT = (
     "what turns and its supports change so much with the angle, and turn so slowly, that modes take more harmonics than "
@@ -56,6 +59,27 @@ class Modes:
     def notes(self) -> list[str]:
         """Of modes that take more harmonics than there is room for."""
         return [CUT.format(self.left)] if self.left > TOLD else []
+
+
+def graded(near: Chart, plain: Chart) -> tuple[Chart, Array | None]:
+    """The chart of a scene at rest with free motions of rising stiffness, each right to its own size, and (d,) the rounding
+    of each, per mass: what is slow and bends no stiff body has none of the rounding of that body's stiffness. `plain` is the
+    same of the scene without inputs.
+
+    As it is, and None, where something moves, or where forces without a potential are no small part of the stiffness.
+    """
+    if not at_rest(near):
+        return near, None
+    K, _ = matrices_at_rest(plain)
+    free = near.Z.T @ K @ near.Z
+    if np.abs(free - free.T).max(initial=0.0) > SKEW * np.abs(free + free.T).max(initial=0.0):
+        return near, None
+    Z, size = near.Z @ np.linalg.eigh(0.5 * (free + free.T))[1], sizes(near.at)
+    movement = np.abs(Z / size[:, None]).max(axis=0, initial=0.0)
+    forces = evaluate(plain.at, near.time, near.x, np.zeros(near.V.size)).force
+    applied = np.abs(np.linalg.solve(near.M, forces) / size).max(initial=0.0)
+    rounding = NULL * (np.einsum("ik,ij,jk->k", np.abs(Z), np.abs(K), np.abs(Z), optimize=True) + applied + SLOWEST)
+    return replace(near, Z=Z, W=near.M @ Z, steps=STEP / np.maximum(movement, 1e-300)), rounding
 
 
 def reduced(found: Steady) -> Reduced:

@@ -36,6 +36,7 @@ from ffr_dyn.equations.layout import Layout, moved, to_body_axes, to_global_axes
 from ffr_dyn.equations.placed import Sums, all_placed, nothing_on
 from ffr_dyn.equations.spinning import spinning
 from ffr_dyn.equations.statics import balance, damping
+from ffr_dyn.functions.differences import differences
 from ffr_dyn.functions.rotation import from_vector, product, rotation_matrix, skew
 from ffr_dyn.linear.hill import harmonics
 from ffr_dyn.linear.turning_on import turning_on
@@ -196,6 +197,10 @@ def matrices(machine: Machine, x: Array, lam: Array, own: Sequence[_Loads] = ())
         forces[one] += part.force
         K[one, one] -= part.hessian
         G[one, one] = part.gyroscopic
+    if not np.isfinite(K).all():
+        raise ComputationError(
+            f"at t = {machine.time:.6g} s a force has no finite value beside the steady motion; look at its function"
+        )
     return Matrices(forces, Phi, jacobian, total_mass_matrix(system.scene, place, x), G, D, K, lam, over_turn)
 
 
@@ -280,13 +285,7 @@ def _add_by_differences(total: Sums, D: Array, screws: Screws, now: At, force: F
 
 def _derivative(function: Callable[[Array], Array], step: float, size: int) -> Array:
     """(V, V) derivative of V = size numbers by as many at zero, by extrapolated central differences."""
-    found = np.zeros((size, size))
-    for k in range(size):
-        coarse, fine = np.zeros(size), np.zeros(size)
-        coarse[k], fine[k] = step, 0.5 * step
-        apart, near = (function(y) - function(-y) for y in (coarse, fine))
-        found[:, k] = (8 * near - apart) / (6 * step)
-    return found
+    return differences(function, np.full(size, step), range(size))[0]
 
 
 # ---- the balance ----------------------------------------------------------------------------------------------------

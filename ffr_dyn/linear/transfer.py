@@ -5,6 +5,10 @@
 for right and left eigenvectors r_k, l_k of A; where derivatives of the input act too, B and D are polynomials in i w.
 A stationary noise with the one-sided density S(f) at the input has the density |H|^2 S at an output, and its root mean
 square is the root of the integral over f. (Preumont 1994, Random Vibration, ch. 5.)
+
+Poles that eigenvalues without rounding tell to lie on i w, of undamped vibrations and at zero, are no matter of solving an
+equation that is singular but for rounding: from values on a circle around it follow whether an output has the pole
+(its Laurent series), and if not, its value there.
 """
 
 from __future__ import annotations
@@ -18,8 +22,16 @@ from ffr_prep.common.arrays import Array
 
 POINTS, AROUND = 400, 41  # frequencies of a band, and those around each resonance
 GAUSS, BELOW = 3, 1e-5  # points between frequencies of an integral; the first one after zero, of the last
-FREE = 1e-6  # of the largest eigenvalue: what is below is a free motion by rounding, no part
+FREE = 1e-6  # of the largest eigenvalue: what is below may be a free motion by rounding, and no part
+SAME = 0.01  # of an eigenvalue, by which rounding may change it
 BESIDE = 1e-3  # of an undamped frequency, as wide as its resonance is taken
+# An integral is divided at growing distances from a resonance: from so many of its widths, where those of `band` end, to a
+# share of its frequency.
+NEAR, GROWING, FAR = 12.0, 1.5, 0.25
+ON = 1e-9  # of a pole: how near to i w it is on it
+CIRCLE = 32  # points around a pole
+HIGHEST = 4  # order of a pole: two of a free motion, two of a motion that is prescribed
+PRINCIPAL = 1e-7  # of the values around a pole: its principal part, if it is no rounding
 
 
 @dataclass(frozen=True)
@@ -34,34 +46,80 @@ class Transfer:
     values: Array
 
 
-def transfer(A: Array, B: Array, C: Array, D: Array, frequencies: Array, count: int, order: int = 0) -> Transfer:
+def transfer(
+    A: Array, B: Array, C: Array, D: Array, frequencies: Array, count: int, order: int = 0, known: Array | None = None
+) -> Transfer:
     """From an input to the outputs of C (O, S); with the parts of the `count` modes that do most.
 
     B (S, P), D (O, P) : shares of the input and of its first P - 1 derivatives
     order              : which derivative of that the input is
+    known              : (m,) [1/s] eigenvalues of A without rounding
     """
-    s = 2j * np.pi * frequencies
-    H, powers = receptances(A, B, C, D, frequencies, order), _powers(s, B, order)
+    s, known = 2j * np.pi * frequencies, np.zeros(0) if known is None else known
+    H, powers = receptances(A, B, C, D, frequencies, order, known), _powers(s, B, order)
     values, left, right = eig(A, left=True, right=True)
     scale = np.einsum("sk,sk->k", left.conj(), right)
-    moves = (values.imag >= 0) & (np.abs(values) > FREE * np.abs(values).max(initial=0.0))
-    chosen = np.flatnonzero(moves & (np.abs(scale) > 1e-12))
+    chosen = np.flatnonzero((values.imag >= 0) & _no_rounding(values, known) & (np.abs(scale) > 1e-12))
     seen, fed = C @ right[:, chosen] / scale[chosen], left[:, chosen].conj().T @ B
-    pole = s[:, None, None] - values[chosen]
-    twin = s[:, None, None] - values[chosen].conj()
+    one, twin = (_inverse(s[:, None, None] - of) for of in (values[chosen], values[chosen].conj()))
     paired = values[chosen].imag > 0
-    parts = seen * (powers @ fed.T)[:, None] / pole + paired * seen.conj() * (powers @ fed.conj().T)[:, None] / twin
-    size = np.abs(parts).max(axis=(0, 1), initial=0.0) / np.maximum(np.abs(H).max(initial=0.0), 1e-300)
+    parts = seen * (powers @ fed.T)[:, None] * one + paired * seen.conj() * (powers @ fed.conj().T)[:, None] * twin
+    bounded = np.abs(H[np.isfinite(H)]).max(initial=0.0)
+    size = np.abs(parts).max(axis=(0, 1), initial=0.0) / max(bounded, 1e-300)
     most = np.sort(np.argsort(-size, kind="stable")[:count])
     most = most[np.argsort(np.abs(values[chosen][most]), kind="stable")]
     return Transfer(frequencies, H, parts[:, :, most], chosen[most], values[chosen][most])
 
 
-def receptances(A: Array, B: Array, C: Array, D: Array, frequencies: Array, order: int = 0) -> Array:
-    """(F, O) complex, the transfer function alone; of the input as in `transfer`."""
-    s, one = 2j * np.pi * frequencies, np.eye(len(A))
-    H = np.array([C @ _answer(at * one - A, B @ u) + D @ u for at, u in zip(s, _powers(s, B, order), strict=True)])
-    return H.reshape(s.size, len(C))
+def _inverse(distances: Array) -> Array:
+    """1 / distances; large where there is none."""
+    found: Array = 1 / np.where(distances, distances, np.finfo(float).tiny ** 0.25)
+    return found
+
+
+def _no_rounding(values: Array, known: Array) -> Array:
+    """(S,) whether an eigenvalue is no zero by rounding: it is large enough, or near one that is known not to be zero."""
+    near = np.abs(values[:, None] - known[np.abs(known) > 0]) <= SAME * np.abs(values)[:, None]
+    found: Array = (np.abs(values) > FREE * np.abs(values).max(initial=0.0)) | near.any(axis=1)
+    return found
+
+
+def receptances(
+    A: Array, B: Array, C: Array, D: Array, frequencies: Array, order: int = 0, known: Array | None = None
+) -> Array:
+    """(F, O) complex, the transfer function alone; of the input as in `transfer`. Infinite at a pole."""
+    H = _answers(A, B, C, D, 2j * np.pi * frequencies, order)
+    known = np.zeros(0) if known is None else known
+    for k, s in enumerate(2j * np.pi * frequencies):
+        if (np.abs(s - known) <= ON * np.abs(s)).any():
+            H[k] = _around(A, B, C, D, s, order, known)
+    return H
+
+
+def _answers(A: Array, B: Array, C: Array, D: Array, s: Array, order: int) -> Array:
+    one, powers = np.eye(len(A)), _powers(s, B, order)
+    H = np.array([C @ _answer(at * one - A, B @ u) + D @ u for at, u in zip(s, powers, strict=True)])
+    return H.reshape(s.size, len(C)).astype(complex)
+
+
+def has_pole(A: Array, B: Array, C: Array, D: Array, pole: complex, order: int, known: Array) -> Array:
+    """(O,) whether an output answers without bound at an eigenvalue."""
+    found: Array = ~np.isfinite(_around(A, B, C, D, pole, order, known))
+    return found
+
+
+def _around(A: Array, B: Array, C: Array, D: Array, pole: complex, order: int, known: Array) -> Array:
+    """(O,) the transfer functions at an eigenvalue, by their means around it; infinite where they have a pole there."""
+    values = np.linalg.eigvals(A)
+    far = values[np.abs(values - pole) > FREE * np.abs(values).max(initial=0.0)]
+    others = np.concatenate([far, known[np.abs(known - pole) > ON * abs(pole)]])
+    beside = np.abs(others - pole).min(initial=abs(pole) or np.inf)  # a motion that is prescribed has a pole at zero
+    radius = 0.5 * (beside if beside < np.inf else 1.0)
+    turn = np.exp(2j * np.pi * (np.arange(CIRCLE) + 0.5) / CIRCLE)
+    H = _answers(A, B, C, D, pole + radius * turn, order)
+    principal = np.abs(np.array([turn**k @ H for k in range(1, HIGHEST + 1)])).max(axis=0) / CIRCLE
+    found: Array = np.where(principal > PRINCIPAL * np.abs(H).max(axis=0), np.inf, H.mean(axis=0))
+    return found
 
 
 def _powers(s: Array, B: Array, order: int) -> Array:
@@ -98,12 +156,24 @@ def band(values: Array, low: float | None = None, high: float | None = None) -> 
 
 def mean_square(A: Array, B: Array, C: Array, D: Array, psd: Array, order: int = 0) -> Array:
     """(O,) of the outputs under a noise, (K, 2) rising frequencies [Hz] and one-sided densities, linear in between: by
-    Gauss's formula between its frequencies, those of `band` and zero."""
+    Gauss's formula between its frequencies, those of `band`, others beside resonances, and zero."""
     f, density = psd.T
-    ends = np.unique(np.concatenate([f, band(np.linalg.eigvals(A), f[0] or BELOW * f[-1], f[-1])]))
+    values = np.linalg.eigvals(A)
+    ends = np.unique(np.concatenate([f, band(values, f[0] or BELOW * f[-1], f[-1]), _beside(values, f[0], f[-1])]))
     half, middle = 0.5 * np.diff(ends), 0.5 * (ends[1:] + ends[:-1])
     at, weight = np.polynomial.legendre.leggauss(GAUSS)
     points = (middle[:, None] + half[:, None] * at).ravel()
     H = receptances(A, B, C, D, points, order)
     found: Array = (half[:, None] * weight).ravel() * np.interp(points, f, density) @ np.abs(H) ** 2
     return found
+
+
+def _beside(values: Array, low: float, high: float) -> Array:
+    """Frequencies [Hz] from low to high at growing distances from resonances, out to where those of `band` are as close."""
+    points = [np.zeros(0)]
+    for value in values[(values.imag > 0) & (values.real != 0)]:
+        first, last = NEAR * abs(value.real), FAR * abs(value.imag)
+        distances = first * GROWING ** np.arange(max(0.0, np.log(last / first) / np.log(GROWING)))
+        points += [(value.imag + sign * distances) / (2 * np.pi) for sign in (-1, 1)]
+    found = np.concatenate(points)
+    return found[(found > low) & (found < high)]

@@ -18,6 +18,7 @@ import numpy as np
 
 from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.functions.time_functions import evaluate
+from ffr_dyn.kernels.tables import MEASURED
 from ffr_dyn.results.power import (
     Worked,
     damping_power,
@@ -34,7 +35,7 @@ from ffr_dyn.results.result import EULER_PARAMETERS, XYZ, Axis, Quantity, mode_a
 from ffr_dyn.scene.couplings import Coupling
 from ffr_dyn.scene.drivers import Driver
 from ffr_dyn.scene.force_kinds import forces_of
-from ffr_dyn.scene.forces.places import Measured
+from ffr_dyn.scene.forces.places import COORDINATE, Measured, OnJoint
 from ffr_dyn.scene.joints import COORDINATES, Joint
 from ffr_dyn.scene.scene import Scene, marker_names, markers, measured_body
 from ffr_dyn.scene.sensors import Measurement, SectionMeasurement, StressMeasurement
@@ -395,7 +396,8 @@ def _measured(view: View, m: Measurement) -> Array:
 def _joint_coordinates(system: System) -> Named:
     for number, joint in enumerate(system.scene.joints):
         if "angle" in COORDINATES[joint.kind]:
-            yield f"{joint.name}.angle", _unwound(number, _angle_driver(system.scene, joint))
+            known = _angle_driver(system.scene, joint), _counted(system.scene, joint)
+            yield f"{joint.name}.angle", _unwound(number, *known)
             rate = lambda view, j=number: angles(view, view.system.scene.joints[j])[1]  # type: ignore[misc]  # noqa: E731
             yield f"{joint.name}.angle_rate", _entry("rad/s", (), "rate of the joint angle", rate)
         if "stroke" in COORDINATES[joint.kind]:
@@ -415,22 +417,43 @@ def _angle_driver(scene: Scene, joint: Joint) -> int | None:
     return next(angular, None)
 
 
-def _unwound(number: int, driver: int | None) -> Entry:
-    """The angle of a joint, which begins within half a turn; with the whole turns of its driver, if it has one."""
+def _counted(scene: Scene, joint: Joint) -> int | None:
+    """The number of a force on the angle of a joint, which counts its turns from step to step."""
+    places = (getattr(force, "place", None) for force in forces_of(scene))
+    on = (
+        k for k, p in enumerate(places) if isinstance(p, OnJoint) and (p.joint, p.coordinate) == (joint.name, "angle")
+    )
+    return next(on, None)
+
+
+def _unwound(number: int, driver: int | None, force: int | None) -> Entry:
+    """The angle of a joint, which begins within half a turn; with the whole turns of its driver, or those that a force has
+    counted since the start, if it has one."""
 
     def compute(view: View, last: Unwound | Worked | None) -> tuple[Array, Unwound]:
         scene = view.system.scene
         moments, (angle, rate) = view.record.time, angles(view, scene.joints[number])
-        if driver is None:
+        if driver is not None:
+            near = _asked(view, scene.drivers[driver])
+        elif force is not None:
+            near = _as_counted(view, force)
+        else:
             return unwind(moments, angle, rate, last if isinstance(last, Unwound) else None)
-        asked: Any = scene.drivers[driver]
-        angle = angle + 2 * np.pi * np.round((_asked(view, asked) - angle) / (2 * np.pi))
+        angle = angle + 2 * np.pi * np.round((near - angle) / (2 * np.pi))
         return angle, Unwound(float(angle[-1]), float(rate[-1]), float(moments[-1]))
 
     return Entry("rad", (), "joint angle, unwound", compute)
 
 
-def _asked(view: View, driver: Driver) -> Array:
+def _as_counted(view: View, force: int) -> Array:
+    """(T,) the angle on which a force acts, less the turns with which it began."""
+    place: Any = forces_of(view.system.scene)[force].place
+    start = int(view.system.model.loads.row[force, MEASURED])
+    counted: Array = view.record.forces[:, start + COORDINATE] - 2 * np.pi * place.turns
+    return counted
+
+
+def _asked(view: View, driver: Any) -> Array:
     """(T,) what a driver prescribes, which is recorded where it has rows."""
     if any(block.name == driver.name for block in view.system.blocks):
         return driven(view, driver)[:, 0]

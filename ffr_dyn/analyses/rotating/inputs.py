@@ -34,17 +34,24 @@ class Acting:
     driver : whose motion it is; None where it is none's
     order  : of a motion, and of the base's displacement or velocity
     scene  : in which the effort is free to act: without the driver
+    in_place_of : the name of the driver in whose place the effort acts; "" where it is in none's
     """
 
     scene: Scene
     effort: str | Effort
     driver: Driver | None = None
     order: int | None = None
+    in_place_of: str = ""
 
     @property
     def moved(self) -> tuple[str, ...]:
         """The coordinate that the driver prescribes."""
         return (f"{self.driver.joint}.{self.driver.coordinate}",) if self.driver else ()
+
+    @property
+    def own(self) -> str:
+        """The output that is the effort itself."""
+        return f"{self.in_place_of}.effort" if self.in_place_of else ""
 
 
 def acting(scene: Scene, given: str | Effort, time: float) -> Acting:
@@ -80,7 +87,8 @@ def _of_driver(scene: Scene, driver: Driver, what: str, time: float) -> Acting |
         return None
     effort = JointEffort("input", driver.joint, driver.coordinate)
     left = _released(scene, driver, time)
-    return Acting(left, effort, driver, orders[what]) if what in orders else Acting(left, effort)
+    moving = what in orders
+    return Acting(left, effort, driver if moving else None, orders[what] if moving else None, driver.name)
 
 
 def _released(scene: Scene, driver: Driver, time: float) -> Scene:
@@ -111,6 +119,17 @@ def components(scene: Scene, outputs: Sequence[str], time: float, who: str) -> t
         except InputError:
             found.append(name)  # another quantity, which who asks for it knows, or names what is near
     return tuple(found)
+
+
+def allowed(of: Acting, names: Sequence[str]) -> Sequence[str]:
+    """The outputs. InputError for what the driver exerts in whose place the input acts, but its effort."""
+    for name in names:
+        if of.in_place_of and name.startswith((f"{of.in_place_of}.", f"{of.in_place_of}_held.")) and name != of.own:
+            raise InputError(
+                f"output {name!r}: the input acts in the place of driver {of.in_place_of!r}, of which only the effort is "
+                f"told; write {of.own!r}"
+            )
+    return names
 
 
 def absolute_order(effort: str | Effort, name: str) -> int | None:

@@ -12,9 +12,10 @@ import numpy as np
 from ffr_dyn.analyses.efforts import Effort
 from ffr_dyn.analyses.linearise import Linearisation, linearised
 from ffr_dyn.analyses.registry import OfMoment, option
-from ffr_dyn.analyses.rotating.inputs import Acting, absolute_order, acting, components, told
+from ffr_dyn.analyses.rotating.inputs import Acting, absolute_order, acting, allowed, components, told
 from ffr_dyn.analyses.rotating.seen_from_ground import Sides, beside, outputs_over_turn, seen_from_ground
 from ffr_dyn.analyses.rotating.steady import steady
+from ffr_dyn.analyses.rotating.without_bound import grows, notes_of_gains, notes_of_growth, under_noise
 from ffr_dyn.analyses.settings import MomentSettings
 from ffr_dyn.analyses.states import scene_at
 from ffr_dyn.analyses.static import static
@@ -150,7 +151,7 @@ def response(
     noise, asked = checked_noise(psd), _checked(frequencies, band_of)
     at = about_state(scene, about, time)
     acts = acting(at, input, time)
-    names = (*components(acts.scene, outputs, time, "response"), *acts.moved)
+    names = (*allowed(acts, components(acts.scene, outputs, time, "response")), *acts.moved)
     linear, sides = _linear(acts, at, names, time)
     low, high = band_of if band_of else (None, None)
     if noise.size and not band_of:
@@ -158,11 +159,12 @@ def response(
     f = asked if asked.size else band(linear.eigenvalues, low, high)
     if acts.order and not f.min() > 0:
         raise InputError(f"frequencies {list(frequencies)}: at 0 Hz a velocity has no displacement; give positive ones")
-    found = transfer(linear.A, linear.B, linear.C, linear.D, f, PARTS, acts.order or 0)
+    found = transfer(linear.A, linear.B, linear.C, linear.D, f, PARTS, acts.order or 0, linear.eigenvalues)
     if sides is not None:
         some = f[:: max(1, f.size // 50)]
         linear = replace(linear, notes=(*linear.notes, *beside(linear, sides, some, linear.outputs, acts.order or 0)))
-    power = _mean_square(linear, sides, noise, acts.order or 0) if noise.size else None
+    power, notes = _mean_square(linear, sides, noise, acts.order or 0)
+    linear = replace(linear, notes=(*linear.notes, *notes_of_gains(linear, found), *notes))
     result = _as_result(scene, linear, found, told(acts, input), noise, power, time)
     if path is not None:
         save_result(result, path)
@@ -191,22 +193,42 @@ def _checked(frequencies: Sequence[float], band_of: tuple[float, float] | None) 
     return found
 
 
-def _mean_square(linear: Linearisation, sides: Sides | None, noise: Array, order: int) -> Array:
-    """(O,) of the outputs under a noise, a mean over a turn: with what they answer beside the frequency of the input."""
-    own = mean_square(linear.A, linear.B, linear.C, linear.D, noise, order)
-    if sides is None:
-        return own
-    more = mean_square(linear.A, linear.B, sides.C, sides.D, noise, order)
-    found: Array = own + 2 * more.reshape(-1, own.size).sum(axis=0)
-    return found
+def _mean_square(linear: Linearisation, sides: Sides | None, noise: Array, order: int) -> tuple[Array, list[str]]:
+    """(O,) of the outputs under a noise, a mean over a turn: with what they answer beside the frequency of the input; and
+    notes on what is infinite."""
+    growing = grows(linear)
+    notes = notes_of_growth(linear, growing)
+    if not noise.size:
+        return np.zeros(0), notes
+    found = mean_square(linear.A, linear.B, linear.C, linear.D, noise, order)
+    if sides is not None:
+        more = mean_square(linear.A, linear.B, sides.C, sides.D, noise, order)
+        found = found + 2 * more.reshape(-1, found.size).sum(axis=0)
+    infinite, why = under_noise(linear, sides, noise, order, growing)
+    return np.where(infinite, np.inf, found), [*notes, *why]
 
 
 def _linear(acts: Acting, at: Scene, names: tuple[str, ...], time: float) -> tuple[Linearisation, Sides | None]:
     """From the input to the outputs, over the turn of what turns; and what they answer beside."""
-    found = linearised(acts.scene, time, (acts.effort,), names)
+    others = tuple(name for name in names if name != acts.own)
+    found = linearised(acts.scene, time, (acts.effort,), others)
     over_turn = outputs_over_turn if acts.driver else seen_from_ground
-    linear, sides = over_turn(found, acts.scene, (acts.effort,), names)
+    linear, sides = over_turn(found, acts.scene, (acts.effort,), others)
+    for k, name in enumerate(names):
+        if name == acts.own:
+            linear, sides = _with_input(linear, sides, k, name)
     return _by_motion(linear, sides, at, time) if acts.driver else _by_base(linear, sides, acts)
+
+
+def _with_input(linear: Linearisation, sides: Sides | None, at: int, name: str) -> tuple[Linearisation, Sides | None]:
+    """With the input itself as one more output, the `at`th."""
+    count, names = len(linear.outputs), list(linear.outputs)
+    names.insert(at, name)
+    C, D = np.insert(linear.C, at, 0.0, axis=0), np.insert(linear.D, at, 1.0, axis=0)
+    if sides is not None:
+        rows = [at + k for k in range(0, len(sides.C), count)]
+        sides = replace(sides, C=np.insert(sides.C, rows, 0.0, axis=0), D=np.insert(sides.D, rows, 0.0, axis=0))
+    return replace(linear, C=C, D=D, outputs=tuple(names)), sides
 
 
 def about_state(scene: Scene, about: About, time: float) -> Scene:
@@ -254,7 +276,7 @@ def _by_motion(
 
 
 def _as_result(
-    scene: Scene, linear: Linearisation, found: Transfer, words: str, psd: Array, power: Array | None, time: float
+    scene: Scene, linear: Linearisation, found: Transfer, words: str, psd: Array, power: Array, time: float
 ) -> Result:
     outputs = Axis("of", tuple(name.replace(".", " ") for name in linear.outputs))
     names = _mode_names(linear, found)
@@ -271,9 +293,10 @@ def _as_result(
         split = np.stack([found.parts.real, found.parts.imag], axis=3)
         quantities["parts"] = Quantity(split, "1", (outputs, modes, parts), "transfer functions of single modes")
     more: dict[str, Any] = {}
-    if power is not None:
+    if psd.size:
         f, s = psd.T
-        density = np.abs(H) ** 2 * np.interp(found.frequencies, f, s, left=0.0, right=0.0)[:, None]
+        level = np.interp(found.frequencies, f, s, left=0.0, right=0.0)[:, None]
+        density = np.multiply(np.abs(H) ** 2, level, out=np.zeros(H.shape), where=level > 0)
         quantities["density"] = Quantity(density, "1/Hz", (outputs,), "one-sided, of the output squared")
         more["rms"] = dict(zip(linear.outputs, np.sqrt(power).tolist(), strict=True))
     attributes = {
@@ -283,7 +306,7 @@ def _as_result(
         "input": words,
         "outputs": list(linear.outputs),
         "modes": names,
-        "notes": [*linear.notes, *_undamped(np.linalg.eigvals(linear.A), psd)],
+        "notes": list(linear.notes),
         "status": "complete",
         **more,
     }
@@ -296,18 +319,6 @@ def _mode_names(linear: Linearisation, found: Transfer) -> list[str]:
     return [linear.leading[k] for k in nearest]
 
 
-def _undamped(values: Array, psd: Array) -> list[str]:
-    f = psd[:, 0]
-    bare = values[(values.imag > 0) & (np.abs(values.real) <= 1e-9 * np.abs(values))]
-    inside = [v for v in bare if f.min(initial=np.inf) <= v.imag / (2 * np.pi) <= f.max(initial=-np.inf)]
-    if not inside:
-        return []
-    return [
-        f"the vibration of {abs(inside[0].imag) / 2 / np.pi:.5g} Hz has no damping: noise excites it without bound, and the "
-        "rms means nothing; give bodies or joints damping"
-    ]
-
-
 def response_lines(result: Result) -> list[str]:
     """The report of the command: every output at rest and at its maximum, the modes that do most there, the rms."""
     a, f, gain = result.attributes, result["frequency"], result["gain"]
@@ -317,7 +328,8 @@ def response_lines(result: Result) -> list[str]:
         top = int(np.argmax(gain[:, k]))
         where = f"gain {gain[0, k]:.5g} at {f[0]:.4g} Hz, at most {gain[top, k]:.5g} at {f[top]:.5g} Hz"
         lines.append(f"output       {name}: {where}")
-        shares = np.abs(parts[top, k]) / gain[top, k] if gain[top, k] else 0.0 * np.abs(parts[top, k])
+        size = np.abs(parts[top, k])
+        shares = size / min(gain[top, k], size.max(initial=0.0)) if gain[top, k] else 0.0 * size
         most = [m for m in np.argsort(-shares, kind="stable")[:3] if SHARE < shares[m] < 1 / SHARE]
         lines += [f"             {100 * shares[m]:5.1f} % there by {a['modes'][m]}" for m in most]
     lines += [f"rms          {name}: {value:.6g}" for name, value in a.get("rms", {}).items()]

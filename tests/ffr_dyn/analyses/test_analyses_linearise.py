@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from ffr_gallery.bodies import beam
 from scipy.linalg import eigh
 from test_analyses_kinematic import slider_crank
 from test_analyses_static import flexible, hanging
@@ -23,7 +24,7 @@ from ffr_dyn.functions.time_functions import polynomial
 from ffr_dyn.integrators import RK4
 from ffr_dyn.results.file import load_result, save_result
 from ffr_dyn.scene.drivers import Driver
-from ffr_dyn.scene.forces import JointSpring, Load, SpringDamper
+from ffr_dyn.scene.forces import Bushing, JointSpring, Load, SpringDamper
 from ffr_dyn.scene.joints import Joint
 from ffr_dyn.scene.scene import Body, Scene
 from ffr_dyn.scene.sensors import Measurement
@@ -234,3 +235,35 @@ def test_a_spring_that_is_not_stretched_but_by_rounding_is_an_equilibrium():
     assert not linearise(scene).notes
     away = replace(scene, forces=[replace(spring, free=0.3 + 1e-6)])
     assert "no equilibrium" in linearise(away).notes[0]
+
+
+@pytest.mark.parametrize(("stiffness", "damping"), [(1e6, 1e2), (1e15, 0.0), (1e6, 1e9)])
+def test_a_slow_pendulum_beside_what_is_fast(stiffness, damping):
+    """A load of a crane on 30 m, 0.57 rad/s, beside a small part on a mount. Before, it was told to be free beside a mount of
+    1e7 rad/s, or a damper that brakes in 1e-8 s."""
+    load = rigid_body("load", mass=1000.0, inertia=(1e3,) * 3, points={"top": (0, 30, 0)})
+    part = rigid_body("part", mass=0.1, inertia=(0.1,) * 3, points={"c": (0, 0, 0)})
+    scene = Scene(
+        [Body("load", load, position=(0, -30, 0)), Body("part", part)],
+        [Joint("hook", "universal", "ground.O", "load.top", axis=(1, 0, 0), axis_j=(0, 0, 1))],
+        forces=[Bushing("mount", "ground.O", "part.c", [stiffness] * 6, [damping] * 6)],
+        ground={"O": (0, 0, 0)}, gravity=(0, -9.81, 0),
+    )  # fmt: skip
+    found = linearise(scene)
+    assert found.free == 0
+    rate = np.sqrt(1000 * 9.81 * 30 / (1e3 + 1000 * 30**2))
+    slow = found.eigenvalues[np.abs(np.abs(found.eigenvalues) / rate - 1) < 1e-5]
+    assert len(slow) == 4
+    assert np.abs(slow.real).max() < 1e-5
+
+
+@pytest.mark.parametrize("ratio", [1.0, 2.5, 20.0])
+def test_an_overdamped_mode_has_one_name_for_both_of_its_decays(ratio):
+    """Of a free beam: w (ratio -+ root(ratio^2 - 1)) of each bending. Before, they were counted as modes of their own."""
+    found = linearise(Scene([Body("rod", beam("rod", 1.0, 2.0, 50.0, 3), damping=ratio)]))
+    undamped = linearise(Scene([Body("rod", beam("rod", 1.0, 2.0, 50.0, 3))]))
+    w = np.abs(undamped.eigenvalues[undamped.free :])[::2]
+    for name, rate in zip(("first", "second", "third"), w, strict=True):
+        own = [k for k, leading in enumerate(found.leading) if leading == f"rod: {name} bending, y"]
+        expected = -rate * (ratio + np.sqrt(ratio**2 - 1) * np.array([-1, 1]))
+        np.testing.assert_allclose(found.eigenvalues[own], expected, rtol=1e-5)

@@ -310,6 +310,13 @@ def rubbing(damping: float) -> Scene:
     return replace(TURNING, forces=(own,))
 
 
+def defined_at_one_point(beside: float) -> Scene:
+    """A force by a Python function that is zero where the scene turns."""
+    at = fd.steady(TURNING)["bar.a.position"][0]
+    own = Load("own", "bar.a", function=lambda t, s: (0.0 if (s.position("bar.a") == at).all() else beside, 0, 0))
+    return replace(TURNING, loads=(own,))
+
+
 def clamped() -> tuple[Scene, float]:
     model = cloud(12, points=6, stiffness=150.0)
     joint = Joint("clamp", "fixed", "ground.O", "b.a")
@@ -824,6 +831,7 @@ INPUT = [
         lambda: forward(CLOUD, end=0.1, output_step=0.01, begin="still"),
         lambda: forward(CLOUD, end=0.1, output_step=0.01, begin="as-given"),
     ),
+    Case(lambda: fd.steady(defined_at_one_point(np.nan)), lambda: fd.steady(defined_at_one_point(0.0))),
     Case(lambda: fd.steady(HINGED, speeds=(1.0,)), lambda: fd.steady(HINGED, speeds=(1.0,), turn="hinge.angle")),
     Case(
         lambda: fd.steady(HINGED, speeds=(1.0,), turn="hing"),
@@ -849,6 +857,10 @@ INPUT = [
     Case(
         lambda: fd.response(HINGED, input="hinge.moment", outputs=["bar.b.position.x"], about="rest"),
         lambda: fd.response(HINGED, input="hinge.moment", outputs=["bar.b.position.x"], frequencies=[1.0]),
+    ),
+    Case(
+        lambda: fd.response(DRIVEN, input="d.angle", outputs=["d.moment.z"], frequencies=[1.0]),
+        lambda: fd.response(DRIVEN, input="d.angle", outputs=["d.effort"], frequencies=[1.0]),
     ),
     Case(
         lambda: fd.response(SPRUNG, input="base.y.velocity", outputs=["bar.b.position.y"], frequencies=[0.0, 1.0]),

@@ -17,7 +17,7 @@ from ffr_dyn.analyses.mixed import Causal, mixed
 from ffr_dyn.analyses.states import scene_at
 from ffr_dyn.analyses.static import static
 from ffr_dyn.functions.time_functions import harmonic, piecewise, polynomial
-from ffr_dyn.integrators import ROS2
+from ffr_dyn.integrators import RK4, ROS2
 from ffr_dyn.scene.couplings import Coupling
 from ffr_dyn.scene.drivers import Driver
 from ffr_dyn.scene.forces import JointSpring, JointStop, Load
@@ -189,3 +189,20 @@ def test_a_driver_that_begins_turns_on_is_told():
     scene = geared(drivers=(Driver("motor", "a", polynomial(0.0, 100.0)),))
     notes = static(scene, time=0.3).attributes["notes"]
     assert any("a driver begins 5 whole turns on" in note for note in notes)
+
+
+@pytest.mark.parametrize("turns", [0, 3])
+def test_the_angle_of_a_joint_has_the_turns_that_a_force_on_it_has_counted(turns):
+    """Rows a second apart of a wheel on a soft spring, which swings by sixteen turns and back. Before, the joint lost turns
+    between rows, whose rates are not those between them; the spring did not."""
+    rate, k, spin = 1.3, 1.3**2 * 0.3, 130.0
+    free = 2 * np.pi * turns
+    spring = JointSpring("s", "a", stiffness=k, free=free, turns=turns)
+    scene = Scene(
+        (Body("one", wheel("one", 0.3), omega_bar=(0, 0, spin)),), (Joint("a", "revolute", "ground.O", "one.c"),),
+        forces=(spring,), ground=GROUND,
+    )  # fmt: skip
+    found = forward(scene, end=8.0, output_step=1.0, method=RK4(1e-3), check=False)
+    expected = spin / rate * np.sin(rate * found.time)
+    np.testing.assert_allclose(found["a.angle"], expected, atol=0.01)
+    np.testing.assert_allclose(found["s.angle"], found["a.angle"] + free, atol=1e-9)

@@ -38,3 +38,26 @@ def test_a_damped_free_motion_has_one_zero():
 
 def test_nothing_at_all_is_free():
     assert eigen(np.zeros((2, 2)), np.zeros((2, 2))).free == 4
+
+
+def test_a_damper_hides_no_slow_vibration():
+    """Of 1 rad/s beside a damper of 1e8 1/s, and a slow decay by one."""
+    found = eigen(np.diag([1.0, 1e10, 4.0]), np.diag([0.0, 1e8, 1e8]))
+    assert found.free == 0
+    np.testing.assert_allclose(found.values[1:4], [-1j, 1j, -1e10 / 1e8], rtol=1e-5)
+    assert -6e-8 < found.values[0].real < -2e-8
+
+
+def test_small_entries_that_are_right_to_their_own_size_stay_so():
+    K = np.diag([0.25, 9.0, 1e16]) + 1e-3 * (1 - np.eye(3)) * np.array([[0, 0, 1], [0, 0, 1], [1, 1, 0]])
+    rounding = 1e-13 * np.diag(K)
+    found = eigen(K, np.zeros((3, 3)), rounding)
+    assert found.free == 0
+    np.testing.assert_allclose(np.abs(found.values), [0.5, 0.5, 3, 3, 1e8, 1e8], rtol=1e-9)
+    assert eigen(K, np.zeros((3, 3))).free == 4  # not known to be right, they may be rounding
+
+
+def test_a_free_motion_beside_a_damper_has_its_second_zero():
+    found = eigen(np.diag([0.0, 1e6]), np.diag([0.0, 1e9]))
+    assert found.free == 2
+    np.testing.assert_allclose(found.values[2:].real, [-1e-3, -1e9], rtol=1e-3)
