@@ -18,7 +18,7 @@ import numpy as np
 from ffr_dyn.compile.engine import fill_rows, new_engine
 from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.compile.workspace import new_record
-from ffr_dyn.consistency.balance import HELD, Account, add_rows, amiss, lost_rebounds, missed_by_rows
+from ffr_dyn.consistency.balance import HELD, Account, add_rows, amiss, lost_rebounds, missed_by_rows, shortest_meeting
 from ffr_dyn.consistency.evaluation import evaluator, joined, record_states
 from ffr_dyn.consistency.explicit_forces import candidates, fastest, told
 from ffr_dyn.consistency.tangent import chart, state_matrix
@@ -91,6 +91,10 @@ class EnergyWatch:
         remedy = ("", "use smaller tolerances") if self.method.controlled else (step, "use a smaller step")
         found = amiss(self.account, kind + remedy[0], remedy[1])
         return [] if found and self._explained_between_rows() else found
+
+    def shortest_meeting(self) -> float:
+        """[s] for which a stop is met at least, infinite where none is."""
+        return shortest_meeting(self.account)
 
     def lost_rebounds(self) -> list[str]:
         """What tells that the steps are too long for the stops that are met."""

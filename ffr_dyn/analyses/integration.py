@@ -585,6 +585,7 @@ def _account(run: _Run, notes: list[str]) -> dict[str, Any]:
         "projections": int(info[PROJECTIONS]),
         **_steps(run.engine),
         "largest_drift": [float(drift[PHI]), float(drift[PHI_DOT])],
+        **({"meeting": lasts} if (lasts := run.energy.shortest_meeting()) < np.inf else {}),
         **({"rebounds": "; ".join(lost)} if (lost := run.energy.lost_rebounds()) else {}),
         **({"missed": missed} if (missed := run.energy.stops_between_rows()) else {}),
         "notes": [

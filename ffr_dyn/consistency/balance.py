@@ -170,6 +170,11 @@ def missed_by_rows(account: Account, row: int, steps: View) -> list[str]:
     ]
 
 
+def shortest_meeting(account: Account) -> float:
+    """[s] for which a stop is met at least, infinite where none is."""
+    return min((_meeting(account, row)[0] for row in range(len(_stops(account.system)))), default=np.inf)
+
+
 def lost_rebounds(account: Account, step: float) -> list[str]:
     """What tells that bodies come from stops with another energy than that of the scene: in runs of a fixed `step` [s] the
     stops that are met too shortly for it, and what undamped ones have lost or fed."""

@@ -14,6 +14,7 @@ from ffr_dyn.analyses.trials.runs import Runs, has_failed
 from ffr_dyn.consistency.assemble import Assembled
 from ffr_dyn.consistency.step_error import (
     BEYOND,
+    KINKED,
     OVER_BREAKS,
     PARTLY_STIFF,
     Beside,
@@ -34,6 +35,7 @@ from ffr_dyn.results.result import Result
 from ffr_prep.common.errors import ComputationError, InputError
 
 LEAP = {2: 16}  # times more in the next one at most, by order (others: 8): an earlier trial tells the error of the next
+FEW = 16  # steps in the time for which a stop is met, with fewer of which errors do not fall by the order yet
 SURE = 2  # order that linearly implicit methods keep where elastic forces are stiff
 
 
@@ -99,6 +101,8 @@ def with_its_errors(runs: Runs, trial: Trial, other: Any, *longer: Any) -> Trial
     share, failed = twin_share(trial.method), any(isinstance(twin, ComputationError) for twin in longer)
     too_long = failed or (share is not None and not trial.twins)  # steps for an order, where twins fail
     order = 1 if too_long else PARTLY_STIFF if share == 0.5 else trial.method.order
+    if trial.method.step * FEW > trial.result.attributes.get("meeting", math.inf):
+        order = min(order, KINKED)
     if runs.untold:
         order = OVER_BREAKS if trial.method.order == 3 else 1
     twins = (*trial.twins, *(twin for twin in longer if not has_failed(twin)))

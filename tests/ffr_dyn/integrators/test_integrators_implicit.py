@@ -269,13 +269,20 @@ def stiff_ball(told: bool) -> Scene:
     )
 
 
-@pytest.mark.parametrize(
-    ("kind", "told"), [("generalised-alpha", False), ("stabilised", False), ("hht", False), ("variational", True)]
-)
-def test_a_step_that_does_not_converge_says_so(kind, told):
+LONGEST = {
+    "generalised-alpha": (False, 2e-3),
+    "stabilised": (False, 2e-3),
+    "hht": (False, 2e-3),
+    "variational": (True, 1 / 504),  # at 2e-3 it tells the spring's own limit
+}
+
+
+@pytest.mark.parametrize("kind", LONGEST)
+def test_a_step_that_does_not_converge_says_so(kind):
     """A force stiffer than the step allows (h^2 k/m = 4): not a wrong result, and with a smaller step a right one."""
+    told, step = LONGEST[kind]
     with pytest.raises(ComputationError, match=r"at t = 0 s the iterations .*'ball'.*spring.*smaller step"):
-        run(stiff_ball(told), KINDS[kind](2e-3), 1.0)
+        run(stiff_ball(told), KINDS[kind](step), 1.0)
     right = run(stiff_ball(told), KINDS[kind](2e-4), 1.0)["ball.c.position"][-1, :2]
     np.testing.assert_allclose(right, (-0.98629074, -0.16504631), atol=5e-7)
 
