@@ -164,7 +164,7 @@ def _of_mean_motion(found: Economy) -> str:
 
 
 def _number(found: Economy, b: int, mode: int) -> int:
-    """The number of a mode as `ffr-prep info` counts it: in mean axes, where the search has them by symmetry, by frequency."""
+    """The number of a mode as `ffr-prep info` counts it: by frequency in mean axes, where it is found by symmetry."""
     body = found.original.bodies[b]
     if body.name not in found.new_frames:
         return mode + 1

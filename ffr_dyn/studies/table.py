@@ -109,7 +109,7 @@ def _padded(values: list[float], count: int) -> list[float]:
 
 
 def _column(values: list[Any], unit: str | None) -> tuple[Any, str | None]:
-    """The values of a parameter as numbers, those with a unit in SI, and that unit; as they are where a text is no quantity."""
+    """The values of a parameter as numbers, those with a unit in SI, and that unit; as they are if a text is none."""
     given = {one: split_quantity(one) for one in values if isinstance(one, str)}
     if not all(given.values()):
         return values, None
