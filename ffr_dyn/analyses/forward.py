@@ -125,14 +125,19 @@ def forward(
         common["stabilisation"] = _tight(stabilisation, getattr(wanted, "accuracy", Within().accuracy))
     common["fast"] = _fast(assembled.system, wanted, start, end, output_step)
     runs, kept = Runs(scene, assembled, start, output_step, common, begin), {"path": path, "resume": resume}
-    if isinstance(wanted, Within):
-        return searched(runs, wanted, kept)
-    method = wanted
-    count = 0 if method.controlled else round(output_step / method.step)
+    with runs.saying_what_is_kept():
+        return _with_errors(runs, wanted, kept, check)
+
+
+def _with_errors(runs: Runs, method: Integrator | Within, kept: dict[str, Any], check: bool | None) -> Result:
+    """The run, and what tells its errors where that is wanted."""
+    if isinstance(method, Within):
+        return searched(runs, method, kept)
+    count = 0 if method.controlled else round(runs.output_step / method.step)
     told = checked(runs, method, count, kept) if check else Trial(method, count, runs.run(method, **kept))
-    if check is None and cost_of_errors(assembled, told.result) < QUICK:
+    if check is None and cost_of_errors(runs.assembled, told.result) < QUICK:
         told = checked(runs, method, count, kept, told.result)
-    return finished(runs, told, resume if path is None else path)
+    return finished(runs, told, kept["resume"] if kept["path"] is None else kept["path"])
 
 
 def _fast(system: System, wanted: Integrator | Within, start: float, end: float, output_step: float) -> Fast | None:

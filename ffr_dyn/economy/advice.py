@@ -6,6 +6,8 @@ elements of second order to the shortest bending wave, whose length follows from
 
 from __future__ import annotations
 
+from itertools import pairwise
+from shlex import quote
 from typing import Any
 
 import numpy as np
@@ -13,32 +15,52 @@ import numpy as np
 from ffr_dyn.economy.result import Economy
 from ffr_dyn.scene.scene import Body
 
+_OWN = ("--unit", "--set", "--solid", "--material", "--interface", "--reference")  # options that stay what they are
+
 
 def advice(found: Economy) -> list[str]:
-    """A line for each flexible body: the command `ffr-prep reduce` that gives what the scene needs of it, and why."""
+    """A line for each flexible body: the command that gives what the scene needs of it, and why."""
     return [_line(found, b, body) for b, body in enumerate(found.original.bodies) if body.model.n]
 
 
 def _line(found: Economy, b: int, body: Body) -> str:
     if not found.choice.parts[b].count:
-        return (
-            f"{body.name}: rigid is enough; mass, inertia and interfaces do: "
-            f"ffr-prep reduce FILE{_interfaces(body)} --method guyan -o {body.name}.ffr"
-        )
+        return f"{body.name}: rigid is enough; mass, inertia and interfaces do: {_command(body, 'guyan')}"
     highest = _highest(found, b)
-    options = f"--method craig-bampton --frequency {_rounded(found.policy.band * highest)}"
-    linear = "" if found.choice.parts[b].stiffened and body.model.stiffening is not None else " --linear"
-    stress = " --stress" if any(output.name == f"{body.name}.stress" for output in found.probe.outputs) else ""
+    linear = not found.choice.parts[b].stiffened or body.model.stiffening is None
+    stress = any(output.name == f"{body.name}.stress" for output in found.probe.outputs)
     size = _mesh_size(body, highest, found.policy.elements_per_wave)
-    mesh = f"; elements of second order of at most {size:.2g} m along it" if size else ""
-    return (
-        f"{body.name}: matters up to {highest:.4g} Hz: ffr-prep reduce FILE{_interfaces(body)} {options}{linear}{stress} "
-        f"-o {body.name}.ffr{mesh}"
-    )
+    mesh = f"; {_elements(body)} of at most {size:.2g} m along it" if size else ""
+    command = _command(body, "craig-bampton", _rounded(found.policy.band * highest), linear=linear, stress=stress)
+    return f"{body.name}: matters up to {highest:.4g} Hz: {command}{mesh}"
 
 
-def _interfaces(body: Body) -> str:
-    return "".join(f" --interface {interface.name}" for interface in body.model.interfaces)
+def _command(body: Body, method: str, frequency: str = "", *, linear: bool = False, stress: bool = False) -> str:
+    """How a body is made, by the command that made it: of a structure file by its entries."""
+    if _words(body)[:1] == ["reduce-structure"]:
+        asked = f'reduction = {{method = "{method}"{f", frequency = {frequency}" if frequency else ""}}}'
+        flags = "".join(f", {key} = true" for key, given in (("linear", linear), ("stress", stress)) if given)
+        return f"{asked}{flags} in its structure FILE, and ffr-prep reduce-structure FILE -o {body.name}.ffr"
+    band = f" --frequency {frequency}" if frequency else ""
+    flags = "".join(f" --{key}" for key, given in (("linear", linear), ("stress", stress)) if given)
+    return f"ffr-prep reduce FILE{_own_options(body)} --method {method}{band}{flags} -o {body.name}.ffr"
+
+
+def _words(body: Body) -> list[str]:
+    """The command that made a body; none of one made in Python or by another program."""
+    return [str(word) for word in body.model.provenance.get("command", ())]
+
+
+def _own_options(body: Body) -> str:
+    """What the geometry, the material and the interfaces of a body were told with."""
+    words = _words(body)
+    own = [(word, value) for word, value in pairwise(words) if word in _OWN and words[0] == "reduce"]
+    made = own or [("--interface", interface.name) for interface in body.model.interfaces]
+    return "".join(f" {word} {quote(value)}" for word, value in made)
+
+
+def _elements(body: Body) -> str:
+    return "elements" if _words(body)[:1] == ["reduce-structure"] else "elements of second order"
 
 
 def _highest(found: Economy, b: int) -> float:

@@ -18,7 +18,7 @@ from ffr_dyn.economy.contributions import Contributions
 from ffr_dyn.economy.inertia_terms import TermEffect
 from ffr_dyn.economy.model_choice import Choice, kind
 from ffr_dyn.economy.result import Economy
-from ffr_dyn.scene.scene import INERTIA_TERMS, Body
+from ffr_dyn.scene.scene import INERTIA_TERMS
 from ffr_prep.common.errors import InputError
 from ffr_prep.common.outputs import replacing
 
@@ -144,26 +144,42 @@ def _bodies(found: Economy) -> Table:
         dropped = [term for term in INERTIA_TERMS if term in part.dropped]
         flexible = part.count > 0
         rows.append((
-            body.name, what, _modes(body, found.choice, b),
+            body.name, what, _modes(found, b),
             " ".join(kept) if flexible else "-", " ".join(dropped) or "-" if flexible else "-", _stiffening(found, b),
         ))  # fmt: skip
     text = (
         "Quasi-static: all frequencies of the body are above what the step resolves, so it deforms without vibrating. A "
         "shape is a combination of modes; a few hold the deformation of this motion. Modes are counted from 1, as in "
-        "`ffr-prep info`."
+        f"`ffr-prep info`{_of_mean_motion(found)}."
     )
     columns = ("body", "modelled", "elastic coordinates", "terms kept", "terms dropped", "stiffening")
     return Table("Bodies", text, columns, tuple(rows))
 
 
-def _modes(body: Body, choice: Choice, b: int) -> str:
-    part = choice.parts[b]
+def _of_mean_motion(found: Economy) -> str:
+    names = [repr(b.name) for b in found.original.bodies if b.name in found.new_frames and b.model.n]
+    if not names:
+        return ""
+    return f"; of {', '.join(names)} those of the body in its mean axes (`ffr-prep convert --reference mean-axis`)"
+
+
+def _number(found: Economy, b: int, mode: int) -> int:
+    """The number of a mode as `ffr-prep info` counts it: by frequency in mean axes, where it is found by symmetry."""
+    body = found.original.bodies[b]
+    if body.name not in found.new_frames:
+        return mode + 1
+    return 1 + int(np.flatnonzero(np.argsort(body.model.omega2, kind="stable") == mode)[0])
+
+
+def _modes(found: Economy, b: int) -> str:
+    body, part = found.original.bodies[b], found.choice.parts[b]
     if not part.count:
         return "none"
     V = part.basis(body.model.n)
     hertz = np.sqrt(np.einsum("ia,i,ia->a", V, body.model.omega2, V)) / (2 * np.pi)
     if part.shapes is None:
-        return ", ".join(f"{mode + 1} ({f:.4g} Hz)" for mode, f in zip(part.modes, hertz, strict=True))
+        modes = sorted(zip((_number(found, b, mode) for mode in part.modes), hertz, strict=True))
+        return ", ".join(f"{number} ({f:.4g} Hz)" for number, f in modes)
     return f"{part.count} shape{'s' * (part.count > 1)} of {len(part.modes)} modes: " + ", ".join(
         f"{f:.4g} Hz" for f in hertz
     )
@@ -231,7 +247,8 @@ def _leading(found: Economy, effects: Contributions, *, most: bool) -> Iterator[
     for k in order[: found.policy.shown_rows if most else found.policy.shown_rows // 2]:
         body = found.original.bodies[effects.body[k]]
         output = int(np.argmax(shares[k]))
-        name = f"{body.name}, mode {effects.mode[k] + 1} ({body.model.frequencies[effects.mode[k]]:.4g} Hz)"
+        number = _number(found, int(effects.body[k]), int(effects.mode[k]))
+        name = f"{body.name}, mode {number} ({body.model.frequencies[effects.mode[k]]:.4g} Hz)"
         yield name, found.probe.outputs[output].name, f"{shares[k, output]:.2g}"
 
 
@@ -269,7 +286,7 @@ def _tried(found: Economy) -> Table:
 def _advice(found: Economy) -> Table:
     lines = advice(found)
     text = (
-        "What the scene needs of its bodies, as commands to run; FILE is the mesh of the body."
+        "What the scene needs of its bodies, as commands to run; FILE is the geometry, the mesh or the structure of the body."
         if lines
         else "No flexible bodies."
     )

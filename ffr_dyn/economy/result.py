@@ -56,6 +56,7 @@ class Economy(Brief):
     unmoved      : names of outputs that no model changes
     frequencies  : of the model beside those of the full model;  stiffening : what stiffens bodies, and how much
     policy       : the numbers of the search
+    new_frames   : names of the bodies whose frame is that of their mean motion here, and whose modes are those of that form
 
     >>> print(fd.as_text(found))  # of what `fd.economise` returned
     """
@@ -85,3 +86,4 @@ class Economy(Brief):
     notes: tuple[str, ...]
     verification: Verification | None
     policy: Policy = DEFAULT
+    new_frames: tuple[str, ...] = ()

@@ -119,7 +119,8 @@ def economise(
     found = _beside_everything(ledger, stiff, omitted, verify) if found is None else found
     economy = _finished(ledger, found, verify)
     settings = replace(economy.settings, end=end, analysis=Forward(tuple(events), begin=begin))
-    return replace(economy, settings=settings, notes=(*economy.notes, *_new_frames(economy, moved)))
+    notes = (*economy.notes, *_new_frames(economy, moved))
+    return replace(economy, settings=settings, notes=notes, new_frames=tuple(moved))
 
 
 def _new_frames(found: Economy, moved: Sequence[str]) -> list[str]:

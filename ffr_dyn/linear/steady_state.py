@@ -320,11 +320,12 @@ def steady_state(assembled: Assembled, time: float, start: Array | None = None) 
     together, refused = _together(found), _not_lasting(found)
     if refused and (together is None or _not_lasting(_followed(together, begin))):
         raise refused
-    varying, notes = np.inf if refused else _varying(found), _turned_on(machine, found.x)
+    varying, notes = np.inf if refused else _varying(found), tuple[str, ...]()
     if varying > VARIES and together is not None:
         one = _followed(together, begin)
         if (less := _varying(one)) < varying and not _not_lasting(one):
-            found, varying, notes = one, less, (*notes, ALL_TURN)
+            found, varying, notes = one, less, (ALL_TURN,)
+    notes = (*_turned_on(found.machine, found.x), *notes)  # of the motion that is taken, not of one that was tried
     if varying > VARIES:
         found = _followed(replace(found.machine, phases=_phases(found.machine)), found.x)
         notes = (*notes, _varies(varying, found.machine.screws.rate))

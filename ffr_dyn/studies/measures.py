@@ -104,7 +104,12 @@ def _value(one: Measured, result: Result) -> Number:
     if one.how == ATTRIBUTE:
         return attribute(result.attributes, one.quantity)
     if one.how == ERROR:
-        errors = result.attributes.get("errors", {})
+        errors = result.attributes.get("errors")
+        if errors is None:
+            raise InputError(
+                f"outputs.{one.name}: this analysis tells no errors of its quantities; ask for {one.quantity}: last, or "
+                "largest"
+            )
         name = COMPONENT.sub("", one.quantity)
         return float(errors[name][0]) if name in errors else float("nan")
     if one.how == HISTORY:

@@ -93,8 +93,9 @@ def _kept(settings: Settings | MomentSettings, outputs: tuple[Measured, ...], wh
     """The settings of the scene with what the study wants kept; further runs tell errors only where they are asked for."""
     names = wanted(outputs)
     found = replace(settings, outputs=(*(settings.outputs if whole else ()), *names) or settings.outputs)
-    if isinstance(found.analysis, Forward) and found.analysis.check is None:
-        return replace(found, analysis=replace(found.analysis, check=any(one.how == ERROR for one in outputs)))
+    asked = any(one.how == ERROR for one in outputs)
+    if isinstance(found.analysis, Forward) and (asked or found.analysis.check is None):
+        return replace(found, analysis=replace(found.analysis, check=asked))
     return found
 
 

@@ -28,6 +28,8 @@ from ffr_prep.common.hdf5 import check_heaps, new_file
 from ffr_prep.common.outputs import replacing
 from ffr_prep.common.process_memory import check_memory
 from ffr_prep.common.reading import reading
+from ffr_prep.common.units import dimension_of, split_quantity, to_si
+from ffr_prep.common.units import in_words as dimension_in_words
 
 RUN, ROW = "run", "row"
 MESSAGE = "message"
@@ -38,11 +40,12 @@ SECTION, FORMAT = "ffr_study", 1
 class Table(Brief):
     """The rows of a study.
 
-    parameters : by name, a value of every run, numbers (N,) or texts
+    parameters : by name, a value of every run: numbers (N,), in SI where they were written with a unit, or texts
     outputs    : by name (N,), NaN for runs that failed or were not done; of histories (N, T), NaN beyond the last row of a
                  run, with "time" [s] (N, T)
     messages   : why a run has failed; empty for the others
-    units      : of outputs that are of a quantity of the runs; of parameters whose value the scene writes with a unit, in SI
+    units      : of outputs that are of a quantity of the runs; of parameters whose value the scene or the study writes with
+                 a unit, in SI
 
     >>> table = fd.load_table("study.nc")
     >>> table.outputs["tip"]
@@ -96,15 +99,27 @@ def table(study: Study, rows: Mapping[int, Row]) -> Table:
         for name, value in row.values.items():
             outputs[name][number, ...] = _padded(value, longest) if isinstance(value, list) else value
     columns = {name: [point[name] for point in study.points] for name in study.parameters}
-    return Table({name: _column(values) for name, values in columns.items()}, outputs, tuple(messages), units)
+    made = {name: _column(values, units.get(name)) for name, values in columns.items()}
+    units |= {name: unit for name, (_, unit) in made.items() if unit}
+    return Table({name: values for name, (values, _) in made.items()}, outputs, tuple(messages), units)
 
 
 def _padded(values: list[float], count: int) -> list[float]:
     return values + [np.nan] * (count - len(values))
 
 
-def _column(values: list[Any]) -> Any:
-    return values if any(isinstance(one, str) for one in values) else np.array(values, dtype=float)
+def _column(values: list[Any], unit: str | None) -> tuple[Any, str | None]:
+    """The values of a parameter as numbers, those with a unit in SI, and that unit; as they are if a text is none."""
+    given = {one: split_quantity(one) for one in values if isinstance(one, str)}
+    if not all(given.values()):
+        return values, None
+    try:
+        for quantity in filter(None, given.values()):
+            unit = unit or dimension_in_words(dimension_of(quantity[1]))
+        size = {text: to_si(*quantity, unit) for text, quantity in given.items() if quantity}
+    except InputError:  # a unit that is none, or of something else: the message of its run
+        return values, None
+    return np.array([size.get(one, one) for one in values], dtype=float), unit
 
 
 _DAMAGE = (ValueError, TypeError, KeyError, AttributeError, OverflowError, RecursionError)  # of a line of the journal

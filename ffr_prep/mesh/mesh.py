@@ -386,10 +386,12 @@ def _check_jacobians(mesh: Mesh) -> None:
         return
     kinds = np.repeat([block.kind for block in mesh.blocks], [len(block.nodes) for block in mesh.blocks])
     state = "flat or collapsed" if abs(worst[bad[0]]) <= _DEGENERATE else "turned inside out, at least in part"
+    curved = any(KINDS[block.kind].means for block in mesh.blocks)
+    straight = ", make its elements straight (first order)" if curved else ""
     remedy = (
         "no element is right, so the mesh is mirrored or has another node order"
         if bad.size == worst.size
-        else "mesh finer there, smooth the mesh, or make its elements straight (first order)"
+        else f"mesh finer there, smooth the mesh{straight}, or put the nodes of such elements in order"
     )
     others = f", as are {bad.size - 1} of the {worst.size - 1} others" if worst.size > 1 else ""
     raise InputError(

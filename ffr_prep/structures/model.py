@@ -22,6 +22,7 @@ from ffr_prep.body import WITHOUT_SHEAR, Surface
 from ffr_prep.body.accelerations import INERTIAL, unit_accelerations
 from ffr_prep.body.provenance import described
 from ffr_prep.common.arrays import Array
+from ffr_prep.common.process_memory import check_memory
 from ffr_prep.common.progress import Stages, no_stages
 from ffr_prep.model.coupled import CoupledModel, InterfaceRegion
 from ffr_prep.model.invariants import InertiaIntegrals, inertia_integrals
@@ -37,6 +38,7 @@ from ffr_prep.structures.interfaces import couple_frame, tie, turning_regions
 from ffr_prep.structures.second_order import frame_second_order
 
 _CHUNK = 512
+_ASSEMBLY = (18e3, 50e3, 65e3)  # bytes for a beam, a triangle, a quadrilateral: somewhat less than was measured
 
 
 @dataclass(frozen=True)
@@ -64,6 +66,7 @@ def from_frame(frame: Frame, interfaces: Sequence[InterfaceRegion] = (), *, prog
 
     >>> model = fp.from_frame(frame, [fp.InterfaceRegion("root"), fp.InterfaceRegion("tip")])
     """
+    _check_size(frame)
     progress("check the frame")
     check_frame(frame)
     progress("assemble stiffness and mass")
@@ -109,6 +112,13 @@ def from_frame(frame: Frame, interfaces: Sequence[InterfaceRegion] = (), *, prog
         record=_record(frame, interfaces, coupled, parts),
         cut=lambda cuts: [from_frame(*part) for part in cut_frame(frame, interfaces, cuts)],
     )
+
+
+def _check_size(frame: Frame) -> None:
+    """InputError where the machine has not the memory that the matrices of all elements take."""
+    counts = [len(nodes) for nodes in (frame.elements, frame.triangles, frame.quadrilaterals)]
+    size = sum(each * count for each, count in zip(_ASSEMBLY, counts, strict=True))
+    check_memory(size, f"the assembly of {sum(counts)} elements", "ask for fewer elements, such as by longer ones")
 
 
 # ---- assembly -----------------------------------------------------------------------------------------------------

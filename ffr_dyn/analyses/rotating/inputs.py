@@ -16,6 +16,7 @@ from ffr_dyn.analyses.states import scene_at
 from ffr_dyn.functions.operations import ADD, MULTIPLY
 from ffr_dyn.functions.time_functions import TimeFunction, as_time_function, is_zero, operation
 from ffr_dyn.scene.drivers import Driver
+from ffr_dyn.scene.joints import COORDINATES, Joint
 from ffr_dyn.scene.scene import Scene, marker_names
 from ffr_prep.common.errors import InputError
 
@@ -65,10 +66,9 @@ def acting(scene: Scene, given: str | Effort, time: float) -> Acting:
     drivers = {d.name: d for d in scene.drivers if isinstance(d, Driver)}
     if head in drivers and (found := _of_driver(scene, drivers[head], what, time)):
         return found
-    joints = {joint.name for joint in scene.joints}
-    kinds = {effort: coordinate for coordinate, effort in EFFORTS.items()}
-    if head in joints and what in kinds:
-        return Acting(scene, JointEffort("input", head, kinds[what]))
+    joints = {joint.name: joint for joint in scene.joints}
+    if head in joints and what in EFFORTS.values():
+        return Acting(scene, _of_joint(joints[head], what))
     marker, _, rest = given.rpartition(".force.") if ".force." in given else given.rpartition(".moment.")
     if marker in marker_names(scene) and rest in COMPONENTS and len(rest) == 1:
         direction = tuple(float(c == rest) for c in COMPONENTS)
@@ -78,6 +78,19 @@ def acting(scene: Scene, given: str | Effort, time: float) -> Acting:
         "driver.angle_rate, body.point.force.x, body.point.moment.x, base.x, base.x.displacement, base.x.velocity, or the "
         f"name of a load; joints are {', '.join(sorted(joints)) or 'none'}, drivers {', '.join(drivers) or 'none'}"
     )
+
+
+def _of_joint(joint: Joint, what: str) -> JointEffort:
+    """A moment or force along a coordinate of a joint. Raises InputError for one that the joint has not."""
+    there = {EFFORTS[coordinate]: coordinate for coordinate in COORDINATES[joint.kind]}
+    if what not in there:
+        instead = " or ".join(f"{joint.name}.{effort}" for effort in there)
+        missing = next(coordinate for coordinate, effort in EFFORTS.items() if effort == what)
+        raise InputError(
+            f"input '{joint.name}.{what}': a {joint.kind} joint has no {missing} along which a {what} acts; write "
+            f"{instead or 'a force at a marker, such as body.point.force.x'}"
+        )
+    return JointEffort("input", joint.name, there[what])
 
 
 def _of_driver(scene: Scene, driver: Driver, what: str, time: float) -> Acting | None:

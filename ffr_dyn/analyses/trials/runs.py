@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -36,6 +38,7 @@ class Runs:
     how: dict[str, Any]
     begin: Beginning
     work: list[int] = field(default_factory=list)  # evaluations of each
+    whole: list[str | Path] = field(default_factory=list)  # files of those that have come to their end
 
     @cached_property
     def vibrations(self) -> Vibrations:
@@ -70,7 +73,19 @@ class Runs:
         """One run."""
         found = integrate(self.scene, method=method, assembled=self.assembled, **{**self.how, **more})
         self.work.append(found.attributes["evaluations"])
+        if more.get("path") is not None:
+            self.whole.append(more["path"])
         return found
+
+    @contextmanager
+    def saying_what_is_kept(self) -> Iterator[None]:
+        """A note for who stops the runs that tell errors: the file holds the run itself."""
+        try:
+            yield
+        except KeyboardInterrupt as end:
+            if self.whole and not hasattr(end, "__notes__"):
+                end.add_note(f"{self.whole[-1]} holds the run, without its errors, which were being found")
+            raise
 
     def together(self, calls: Sequence[Callable[[Say], Any]], leader: bool) -> list[Any]:
         """The results of the calls, or their exceptions; that of a leader, the first, ends the others and is raised.

@@ -851,6 +851,10 @@ INPUT = [
         lambda: fd.response(HINGED, input="hinge.moment", outputs=["bar.b.position.x"], frequencies=[1.0]),
     ),
     Case(
+        lambda: fd.response(HINGED, input="hinge.force", outputs=["bar.b.position.x"], frequencies=[1.0]),
+        lambda: fd.response(HINGED, input="hinge.moment", outputs=["bar.b.position.x"], frequencies=[1.0]),
+    ),
+    Case(
         lambda: fd.response(HINGED, input="hinge.moment", outputs=[]),
         lambda: fd.response(HINGED, input="hinge.moment", outputs=["bar.b.position.x"], frequencies=[1.0]),
     ),

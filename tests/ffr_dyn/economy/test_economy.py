@@ -68,6 +68,8 @@ from ffr_dyn.scene_file.state_formula import StateFormula
 from ffr_dyn.scene_file.write import save_scene
 from ffr_dyn.variants.mean_axis import in_new_frames, with_mean_axis_bodies
 from ffr_dyn.variants.variant import STIFFENING, stiffening_by
+from ffr_prep.body import mean_axis_form
+from ffr_prep.cli import cli as ffr_prep_command
 from ffr_prep.common.errors import ComputationError, InputError
 from ffr_prep.model.reference import FixedTo, MeanAxis, SimplySupported
 from ffr_prep.structures.sections import rectangle
@@ -620,6 +622,13 @@ def test_stress_that_the_shapes_of_the_full_model_lack_is_told():
 # ---- report, advice, chart, command ---------------------------------------------------------------------------------
 
 
+def assert_counted(text, models):
+    """Modes in a report have the numbers of these bodies, as `ffr-prep info` counts them: from 1."""
+    counted = re.findall(r"(\w+), mode (\d+) \((\S+) Hz\)", text)
+    assert counted
+    assert all(f"{models[body].frequencies[int(mode) - 1]:.4g}" == hertz for body, mode, hertz in counted)
+
+
 def test_the_report_says_it_all(fast, tmp_path):
     text = as_text(fast)
     for part in (
@@ -634,10 +643,11 @@ def test_the_report_says_it_all(fast, tmp_path):
         assert part in text
     assert "slider.pin.position.x" in text
     assert "Verified" in text
-    frequencies = {body.name: body.model.frequencies for body in fast.original.bodies}
-    counted = re.findall(r"(\w+), mode (\d+) \((\S+) Hz\)", text)
-    assert counted
-    assert all(f"{frequencies[body][int(mode) - 1]:.4g}" == hertz for body, mode, hertz in counted)  # from 1
+    assert "those of the body in its mean axes (`ffr-prep convert --reference mean-axis`)" in text
+    assert_counted(text, {b.name: mean_axis_form(b.model).body for b in slider_crank(150.0).bodies if b.model.n})
+    own = as_text(replace(fast, new_frames=()))
+    assert "as in `ffr-prep info`.\n" in own
+    assert_counted(own, {b.name: b.model for b in fast.original.bodies})
     assert "| rod | flexible" in as_markdown(fast, "chart.png")
     page = as_html(fast, b"png")
     assert page.startswith("<!doctype html>")
@@ -653,6 +663,51 @@ def test_advice_is_a_command_to_run(fast):
     assert lines[0].startswith("crank: rigid is enough")
     assert "ffr-prep reduce FILE --interface a --interface b --method craig-bampton --frequency" in lines[1]
     assert "--stress" in lines[1]
+
+
+def made_by(found, *command):
+    """What was found, of bodies that a command has made."""
+    bodies = (
+        replace(body, model=replace(body.model, provenance={"command": list(command)}))
+        for body in found.original.bodies
+    )
+    return replace(found, original=replace(found.original, bodies=tuple(bodies)))
+
+
+STRUCTURE = """
+[nodes]
+a = [0, 0, 0]
+b = [0.2, 0, 0]
+[members.bar]
+section = {shape = "circle", d = 0.01}
+material = "steel"
+[[polylines]]
+member = "bar"
+elements = 4
+corners = [[0, 0, 0], [0.2, 0, 0]]
+[interfaces.a]
+[interfaces.b]
+"""
+
+
+@pytest.mark.parametrize("number", [0, 1])
+def test_advice_on_a_structure_changes_its_file(fast, number, tmp_path):
+    """The body that is rigid, and the one that has modes and stress: the entries that are told work as they stand."""
+    line = advice(made_by(fast, "reduce-structure", "rod.toml"))[number]
+    entries = re.search(
+        r"(reduction = .*) in its structure FILE, and (ffr-prep reduce-structure FILE -o .*\.ffr)", line
+    )
+    assert ("frequency" in entries[1], "stress = true" in entries[1]) == (number == 1, number == 1)
+    (tmp_path / "bar.toml").write_text(re.sub(r", (\w+ = true)", r"\n\1", entries[1]) + STRUCTURE)
+    words = [word.replace("FILE", str(tmp_path / "bar.toml")) for word in entries[2].split()[1:-1]]
+    ffr_prep_command.main(args=[*words, str(tmp_path / "bar.ffr")], standalone_mode=False)
+    assert (tmp_path / "bar.ffr").exists()
+
+
+def test_advice_keeps_what_a_body_was_made_of(fast):
+    own = ("--unit", "mm", "--interface", "big eye=bore", "--material", "steel")
+    line = advice(made_by(fast, "reduce", "rod.geo", *own, "--size", "2", "--modes", "4"))[1]
+    assert "reduce FILE --unit mm --interface 'big eye=bore' --material steel --method craig-bampton --freq" in line
 
 
 def test_the_chart_is_a_diagram_of_all_runs_with_the_chosen_one(fast):

@@ -132,6 +132,23 @@ def test_a_bushing_that_is_no_bearing_is_told(speed, tilting, told):
     assert sum(said in note for note in fd.steady(scene).attributes["notes"]) == told
 
 
+@pytest.mark.parametrize("own", [0.0, 100.0])
+def test_a_bushing_that_turns_with_both_its_ends_is_no_bearing(own):
+    """A disc on the hub of a driver, whose scene gives it the speed or leaves that to be found."""
+    hub = fd.rigid_body("hub", mass=1e-3, inertia=(1e-6, 1e-6, 1e-6), points={"c": (0, 0, 0)})
+    disc = fd.rigid_body("disc", mass=10.0, inertia=(0.06, 0.06, 0.1), points={"c": (0, 0, 0)})
+    scene = fd.Scene(
+        (fd.Body("hub", hub), fd.Body("disc", disc, omega_bar=(0, 0, own))),
+        (fd.Joint("bearing", "revolute", "ground.O", "hub.c"),),
+        drivers=(fd.Driver("motor", "bearing", lambda t: 100.0 * t),),
+        forces=(fd.Bushing("mount", "hub.c", "disc.c", (4e5, 4e5, 1e8, 3e3, 3e3, 1e6)),),
+        ground={"O": (0, 0, 0)},
+    )
+    notes = fd.steady(scene, speeds=(100.0,), turn="motor").attributes["notes"]
+    assert not any("turned on and on" in note for note in notes)
+    assert any("give them omega_bar" in note for note in notes) == (own == 0.0)
+
+
 def test_screws_carry_bodies():
     place = (assembled := assemble(in_space(governor(6.0)))).system.layout
     screws = screws_of(place, assembled.x, assembled.v)

@@ -58,6 +58,17 @@ def swept(outputs: dict[str, str] = ANGLE, *, space: bool = True, another: bool 
     return inside(sweep)
 
 
+def at_rest(output: str) -> object:
+    """A sweep of equilibria."""
+
+    def sweep() -> object:
+        scene = SCENE.replace("end = 0.2\noutput_step = 0.01\nstep = 1e-3", 'kind = "static"')
+        Path("hanging.toml").write_text(scene)
+        return fd.sweep(study("hanging.toml", G, {"x": output}), "t.nc", workers=0)
+
+    return inside(sweep)
+
+
 def read(*, study: bool, of_format: int = FORMAT) -> object:
     def load() -> Table:
         scene, settings = fd.load_scene("bar.toml")
@@ -120,6 +131,7 @@ CASES = [
     Case(asked(G, {"angle": "hinge.angle"}), asked(G)),
     Case(asked(G, {"time": "hinge.angle: last"}), asked(G)),
     Case(p(swept, {"x": "hinge.force: history"}), p(swept, {"x": "hinge.force.x: history"})),
+    Case(p(at_rest, "hinge.angle: error"), p(at_rest, "hinge.angle: last")),
     Case(p(swept, {"x": "degree: attribute"}), p(swept, {"x": "degrees_of_freedom: attribute"})),
     Case(p(attribute, {"jumps": ["x"]}, "jumps.1"), p(attribute, {"jumps": ["x"]}, "jumps")),
     Case(p(attribute, {"jumps": ["x"]}, "jump"), p(attribute, {"jumps": ["x"]}, "jumps")),

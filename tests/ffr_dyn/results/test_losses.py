@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from places import ROOT
 
+from ffr_dyn.analyses import forward
 from ffr_dyn.cli import main
 from ffr_dyn.compile.first_use import ensure_compiled
 from ffr_dyn.integrators import ROS2
@@ -107,3 +108,19 @@ def test_a_full_disk_ends_a_run_in_order(scene, tmp_path, monkeypatch, limit, ke
     if kept:
         assert load_result(output).time.size > 10
         assert_goes_on(scene, output, monkeypatch)
+
+
+def test_who_stops_what_tells_the_errors_of_a_run_is_told_of_the_run(scene, tmp_path, monkeypatch, capsys):
+    """It is whole, in its file, and what goes on beside it is the search for its errors."""
+
+    def stopped(*_: object) -> None:
+        raise KeyboardInterrupt("SIGTERM")
+
+    output = tmp_path / "x.nc"
+    monkeypatch.setattr(forward, "checked", stopped)
+    monkeypatch.setattr(sys, "argv", ["ffr-dyn", "run", str(scene), "-o", str(output), "--end", "0.1"])
+    with pytest.raises(SystemExit, match="1"):
+        main()
+    kept = f"{output} holds the run, without its errors, which were being found"
+    assert capsys.readouterr().err.strip().endswith(f"interrupted by SIGTERM; {kept}")
+    assert load_result(output).attributes["status"] == "complete"

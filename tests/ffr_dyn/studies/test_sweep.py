@@ -20,7 +20,7 @@ from ffr_dyn.studies.draw import running_mean, tornado
 from ffr_dyn.studies.measures import attribute, measured
 from ffr_dyn.studies.plan import mark
 from ffr_dyn.studies.runs import Row, body_file
-from ffr_dyn.studies.table import Journal, journal_of
+from ffr_dyn.studies.table import Journal, journal_of, table
 from ffr_prep.common.errors import ComputationError, InputError
 from ffr_prep.common.outputs import reserved
 
@@ -346,6 +346,31 @@ def test_the_journal_of_another_study_is_refused(folder):
     other = fd.study(folder / "bar.toml", {"g": [1, 2]}, {"angle": "hinge.angle: last"})
     with pytest.raises(InputError, match="is of another study"):
         fd.sweep(other, folder / "t.nc", workers=0)
+
+
+@pytest.mark.parametrize(
+    ("given", "column", "unit"),
+    [
+        (["100 cm", "50 in", 2.0], [1.0, 1.27, 2.0], "m"),
+        (["1 m", "2 s"], ["1 m", "2 s"], None),
+        (["1 m", "2 * 3"], ["1 m", "2 * 3"], None),
+        ([1.0, 2.0], [1.0, 2.0], None),
+    ],
+)
+def test_parameters_with_units_are_numbers_in_si(folder, given, column, unit):
+    """Where all of them are quantities of one kind; their pictures have an axis then."""
+    study = fd.study(folder / "bar.toml", {"length": given}, {"angle": "hinge.angle: last"})
+    made = table(study, {k: Row(k, {"angle": 1.0 + k}) for k in range(len(given))})
+    assert list(made["length"]) == pytest.approx(column) if unit else list(made["length"]) == column
+    assert made.units.get("length") == unit
+    if unit:
+        assert {path.name for path in fd.plot_study(made, folder / "p")} >= {"angle.png", "angle-tornado.png"}
+
+
+def test_errors_are_found_where_a_study_asks_for_them_whatever_the_scene_says(folder):
+    (folder / "bar.toml").write_text(SCENE.replace("step = 1e-3", "step = 1e-3\ncheck = false"))
+    found = fd.sweep(fd.study(folder / "bar.toml", {"g": [5]}, {"e": "hinge.angle: error"}), folder / "t.nc", workers=0)
+    assert 0.0 < found["e"][0] < 1e-4
 
 
 @pytest.mark.slow

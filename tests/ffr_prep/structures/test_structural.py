@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import tracemalloc
 from dataclasses import replace
 
 import numpy as np
@@ -18,12 +19,14 @@ from ffr_dyn.integrators import ROS2
 from ffr_dyn.scene.joints import Joint
 from ffr_dyn.scene.scene import Body, Scene
 from ffr_prep.body import load_body, save_body
+from ffr_prep.common import process_memory
 from ffr_prep.common.errors import InputError
 from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.material import Material
 from ffr_prep.model.reference import FixedTo, MeanAxis, SimplySupported, Support, Supports
 from ffr_prep.reduction.methods.craig_bampton import CraigBampton
 from ffr_prep.reduction.methods.eigenmodes import Eigenmodes
+from ffr_prep.structures import model
 from ffr_prep.structures.beams import axis_functions, beams, field, mass_points, stiffness, undeformed
 from ffr_prep.structures.element_families import beam_elements, families
 from ffr_prep.structures.frame import (
@@ -697,3 +700,30 @@ def test_interfaces_that_cannot_be_used(interfaces, says):
             fp.from_frame(space_frame(), interfaces),
             fp.Request(name="f", reference=FixedTo("a"), reduction=CraigBampton(1)),
         )
+
+
+@pytest.mark.parametrize("kind", ["beams", "triangles", "quadrilaterals"])
+def test_a_structure_beyond_the_memory_of_the_machine_is_refused_before_its_elements_are_made(kind, monkeypatch):
+    steel = fp.material("steel")
+    beams = fp.polyline([(0, 0, 0), (1, 0, 0)], fp.Member(fp.circle(0.02), steel), elements=400)
+    plate = fp.panel([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)], fp.Shell(2e-3, steel), elements=(20, 20))
+    frame = {"beams": beams, "triangles": fp.triangulated(plate), "quadrilaterals": plate}[kind]
+    monkeypatch.setattr(process_memory, "left", lambda: 5_000_000)
+    monkeypatch.setattr(model, "families", lambda frame: pytest.fail("the elements were made"))
+    with pytest.raises(InputError, match=r"the assembly of (400|800) elements takes .* ask for fewer elements"):
+        fp.from_frame(frame)
+
+
+def test_the_memory_that_a_structure_is_refused_for_is_taken_by_its_assembly(monkeypatch):
+    """No model is refused that would have fitted: what is asked for is less than what was taken."""
+    steel = fp.material("steel")
+    plate = fp.panel([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)], fp.Shell(2e-3, steel), elements=(20, 20))
+    beams = fp.polyline([(0, 0, 0), (1, 0, 0)], fp.Member(fp.circle(0.02), steel), elements=400)
+    asked = list[float]()
+    monkeypatch.setattr(model, "check_memory", lambda size, *_: asked.append(size))
+    for frame in (plate, fp.triangulated(plate), beams):
+        tracemalloc.start()
+        fp.from_frame(frame)
+        taken = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+        assert 0.4 * taken < asked[-1] < taken
