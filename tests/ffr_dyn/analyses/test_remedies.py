@@ -196,7 +196,7 @@ def struck(damping: float) -> Scene:
     """A bar between two stops, swung so that it strikes them again and again, at random where little damps it."""
     spring = fd.JointSpring("s", "hinge", stiffness=3.0, damping=damping)
     stop = fd.JointStop("stop", "hinge", stiffness=2e4, entry=1e-3, lower=-0.1, upper=0.12)
-    moment = Load("l", "bar.b", moment=(0, 0, harmonic(amplitude=20.0 if damping < 1 else 6.0, frequency=1.3)))
+    moment = Load("l", "bar.b", moment=(0, 0, harmonic(amplitude=80.0 if damping < 1 else 6.0, frequency=1.3)))
     return replace(HINGED, forces=(spring, stop), loads=(moment,))
 
 
