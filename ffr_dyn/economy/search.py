@@ -24,6 +24,7 @@ import numpy as np
 
 from ffr_dyn.analyses.events import Event
 from ffr_dyn.analyses.forward import Forward, forward
+from ffr_dyn.analyses.integration import fast_within
 from ffr_dyn.analyses.settings import Settings
 from ffr_dyn.analyses.trials.begin import Beginning
 from ffr_dyn.consistency.assemble import Assembled, assemble, body_doubts
@@ -157,8 +158,11 @@ def _ended(scene: Scene, assembled: Assembled, span: Span, events: Sequence[Even
 
 
 def _surely_rigid(ledger: Ledger, stiff: Rigid, omitted: Contributions) -> Chosen | None:
-    """Rigid bodies, where the estimate of what they leave out is far below the tolerances; None where it is not."""
+    """Rigid bodies, where the estimate of what they leave out is far below the tolerances; None where it is not, or where it
+    cannot tell."""
     limits, model = stiff.limits, omitted.effect.sum(axis=0)
+    if _acts_between_rows(stiff.trial, ledger.span):
+        return None
     if limits is None or (model > ledger.policy.surely_rigid * limits).any():
         return None
     stepped = _with_step(ledger, replace(stiff.trial.choice, method=PILOT), model, limits)
@@ -175,6 +179,14 @@ def _surely_rigid(ledger: Ledger, stiff: Rigid, omitted: Contributions) -> Chose
         scales,
         omitted,
     )
+
+
+def _acts_between_rows(trial: Trial, span: Span) -> bool:
+    """Whether a stop is met or a force comes and goes within a row: that sets off vibrations of which the loads at rows, that
+    the estimate goes by, know nothing."""
+    steps = trial.choice.integrator(span.output_step)
+    fast = fast_within(trial.made.assembled.system, steps, span.start, span.end, span.output_step)
+    return "meeting" in trial.result.attributes or (fast is not None and len(fast.spans) > 0)
 
 
 def _with_step(ledger: Ledger, choice: Choice, model: Array, limits: Array) -> Stepped:

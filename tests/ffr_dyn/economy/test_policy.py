@@ -122,6 +122,7 @@ def around(value: float) -> tuple[float, float]:
 
 def surely_rigid(policy: Policy, patch: Any) -> Any:
     """Whether rigid bodies are believed without a run of everything."""
+    patch.setattr(search, "_acts_between_rows", lambda trial, span: False)
 
     def decided(effect: float) -> bool:
         ledger = runs(policy)
@@ -580,6 +581,7 @@ def found_by(policy: Policy, **more: Any) -> Any:
     """What a search would return, as far as its report is concerned."""
     choice = replace(EVERYTHING, parts=(Part((0,)), Part(())))
     given = {"policy": policy, "limits": ONE, "original": SCENE, "probe": OF, "choice": choice, "frequencies": ()}
+    given["new_frames"] = ()
     return SimpleNamespace(**given | more)
 
 
