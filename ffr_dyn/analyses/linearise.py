@@ -24,9 +24,11 @@ from ffr_dyn.analyses.states import scene_at
 from ffr_dyn.analyses.static import static
 from ffr_dyn.compile.engine import with_model
 from ffr_dyn.consistency.assemble import assemble, seen_in_space
-from ffr_dyn.consistency.doubts import checked
+from ffr_dyn.consistency.doubts import KINK, checked
 from ffr_dyn.consistency.evaluation import Evaluator, evaluate, evaluator
+from ffr_dyn.consistency.kinks import kinked_forces
 from ffr_dyn.consistency.tangent import STEP, Chart, at_rest, chart, derivative, rates, sizes, state, state_matrix
+from ffr_dyn.equations.forces import At
 from ffr_dyn.equations.layout import to_global_axes
 from ffr_dyn.kernels.tables import LAW
 from ffr_dyn.linear.eigen import NULL, eigen
@@ -238,7 +240,7 @@ def linearised(
         *assembled.notes,
         *_notes(near, steady, A, rounding),
         *solved.notes,
-        *checked("linearise", assembled, at.record),
+        *checked("linearise", assembled, at.record, {KINK: kinked_forces(_here(_without_inputs(near, inputs)))}),
     )
     notes = (*notes, *told(strained, leading[strained.mode]))
     driven = tuple(driver.name for driver in scene.drivers)
@@ -254,6 +256,11 @@ def steady_about(near: Chart, inputs: tuple[Effort | str, ...]) -> Steady | None
         return None
     plain = _without_inputs(near, inputs)
     return steady_here(plain.at.system, near.time, near.x, to_global_axes(plain.at.system.layout, near.x, near.V))
+
+
+def _here(near: Chart) -> At:
+    system = near.at.system
+    return At(system.scene, system.layout, near.time, near.x, to_global_axes(system.layout, near.x, near.V))
 
 
 def _without_inputs(near: Chart, inputs: tuple[Effort | str, ...]) -> Chart:
@@ -494,14 +501,6 @@ _AXES = {True: "input", False: "output"}
 def _labels(names: tuple[str, ...]) -> tuple[str, ...]:
     """Labels of an axis contain no dot."""
     return tuple(name.replace(".", " ") for name in names)
-
-
-def table_of_modes(found: Linearisation) -> list[str]:
-    """A line for each mode: frequency, damping ratio, real part, and what moves; one of each conjugate pair, free motions
-    first. Of scenes that turn, also the whirl and its frequency from the ground."""
-    parts = np.column_stack([found.eigenvalues.real, found.eigenvalues.imag])
-    columns = parts, found.frequencies, found.damping_ratios, found.seen, found.whirl
-    return _lines_of_modes(*columns, leading=found.leading, free=found.free)
 
 
 def _lines_of_modes(

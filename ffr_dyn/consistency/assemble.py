@@ -208,11 +208,6 @@ def flattened(scene: Scene, time: float) -> tuple[Scene, list[Block]]:
     return flat.scene, list(flat.rows.blocks)
 
 
-def plane_in_words(scene: Scene, time: float) -> str:
-    """Whether a scene is computed in the plane or in space, and why."""
-    return flat_form(scene, time).computed
-
-
 def flat_form(scene: Scene, time: float) -> Flat:
     """A scene as it is computed (`flattened`). Raises InputError for a body without the inertia to move."""
     found = _in_plane_or_space(scene, time)

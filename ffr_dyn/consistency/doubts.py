@@ -62,8 +62,9 @@ TABLE: dict[str, dict[str, str]] = {
     "spin without stiffening": _verdicts(NOTE, NOTE, NONE, NONE, NOTE),
     "singular position": _verdicts(NOTE, NOTE, NOTE, NONE, NONE),
     "mass matrix nearly singular": _verdicts(NOTE, NOTE, NONE, NOTE, NOTE),
+    "kink of a force": _verdicts(NONE, NONE, NONE, NONE, NONE) | {"linearise": NOTE},
 }
-OPEN, APART, ASTRAY, QUICK, _, BALANCE, STIFF, WOUND, STRAINED, MEANINGLESS, SPUN, SINGULAR, MASS = TABLE
+OPEN, APART, ASTRAY, QUICK, _, BALANCE, STIFF, WOUND, STRAINED, MEANINGLESS, SPUN, SINGULAR, MASS, KINK = TABLE
 
 MET = 1e-8  # m, -: of constraints that Newton's method closes
 KEPT = 10.0  # times the tolerance of a projection

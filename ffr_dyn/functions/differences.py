@@ -21,9 +21,9 @@ ROUNDING = 8 * np.finfo(float).eps  # of values, over the step
 NOISE = 1e3  # times that: an error that may be rounding's
 SMALLER, LEVELS = 0.1, 8  # by which a step becomes smaller, and how often
 NOT_DEFINED = (ArithmeticError, ValueError, TypeError)  # of Python functions beyond a gap: logarithms, complex powers
-JUMP = (
-    0.3  # of a derivative: an error that no step has reduced is that of a jump, of which the first step tells the most
-)
+# Of a derivative that smaller steps make no smaller: an error that none has reduced is that of a jump, of which the first
+# step tells the most.
+JUMP = 0.3
 WORSE = 1.01  # times the error relative to the derivative, which stays as it is far beyond where a function is level
 
 
@@ -39,7 +39,7 @@ def differences(function: Callable[[Array], Array], steps: Array, columns: Itera
     first = found.copy(), errors.copy()
     for k in columns:
         _refine(function, k, steps, ROUNDING * largest / steps[k], (found, errors))
-    jumps = np.isfinite(first[0]) & ~(errors <= JUMP * np.abs(found))
+    jumps = np.isfinite(first[0]) & ~(errors <= JUMP * np.abs(found)) & ~(np.abs(found) < np.abs(first[0]))
     return np.where(jumps, first[0], found), np.where(jumps, first[1], errors)
 
 

@@ -40,21 +40,13 @@ def plate_stiffening(elements: Plates, static: Array, accelerations: Array, basi
         to_element = element_coordinates(part)
         strain = membrane_strain(part, at) @ (to_element @ static[own])[:, None]
         forces = part.membrane[:, None] @ strain
-        gradient, area = _gradient(part, to_element @ basis[own])
+        gradient, area = shape_gradient(part, to_element @ basis[own])
         for load, stiffness in enumerate(K):
-            stiffness += _of_forces(gradient, area, forces[..., load])
+            stiffness += of_membrane_forces(gradient, area, forces[..., load])
     return K
 
 
-def stiffness_of_forces(elements: Plates, forces: Array, e: Array) -> Array:
-    """(n, n) geometric stiffness of the shapes e (E, 6k, n), in element axes.
-
-    forces : (E, Q, 3) xx, yy, xy per length [N/m] at the Q points of the stiffness rule, or (E, 1, 3) where constant
-    """
-    return _of_forces(*_gradient(elements, e), forces)
-
-
-def _gradient(elements: Plates, e: Array) -> tuple[Array, Array]:
+def shape_gradient(elements: Plates, e: Array) -> tuple[Array, Array]:
     """(2, 3, E, Q, n) d u_m / d x_a at [a, m] of the shapes e (E, 6k, n), and the area (E, Q) of the points."""
     k = elements.lift.shape[1]
     at, weights = rule(k, _ORDER[k])
@@ -94,7 +86,7 @@ def _forces_of_products(elements: Plates, one: Array, others: Array) -> Array:
     return to_element.transpose(0, 2, 1) @ of_coordinates
 
 
-def _of_forces(gradient: Array, area: Array, forces: Array) -> Array:
+def of_membrane_forces(gradient: Array, area: Array, forces: Array) -> Array:
     n = gradient.shape[-1]
     xx, yy, xy = np.moveaxis(forces * area[..., None], -1, 0)[..., None]
     weighted = np.stack([xx * gradient[0] + xy * gradient[1], xy * gradient[0] + yy * gradient[1]])

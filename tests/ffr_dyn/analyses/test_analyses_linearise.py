@@ -14,7 +14,7 @@ from test_quasi_static import rotor
 
 from ffr_dyn.analyses.efforts import JointEffort, MarkerEffort, recorded, with_effort
 from ffr_dyn.analyses.integration import integrate
-from ffr_dyn.analyses.linearise import as_result, linearise, table_of_modes
+from ffr_dyn.analyses.linearise import Linearise, as_result, linearise
 from ffr_dyn.analyses.rotating.response import response
 from ffr_dyn.analyses.states import scene_at
 from ffr_dyn.analyses.static import static
@@ -157,7 +157,7 @@ def test_the_result_can_be_kept(tmp_path):
     kept = load_result(save_result(as_result(hanging(-np.pi / 2), found), tmp_path / "l.nc"))
     np.testing.assert_array_equal(kept["A"][0], found.A)
     np.testing.assert_array_equal(kept["D"][0], found.D)
-    assert len(table_of_modes(found)) == 1
+    assert len(Linearise().report(kept)) == 1
 
 
 def test_any_quantity_may_be_an_output():

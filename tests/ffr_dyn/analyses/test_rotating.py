@@ -16,7 +16,7 @@ from test_quasi_static import rotor
 
 import ffr_dyn as fd
 import ffr_prep as fp
-from ffr_dyn.analyses.linearise import table_of_modes
+from ffr_dyn.analyses.linearise import as_result
 from ffr_dyn.cli import cli
 
 
@@ -111,7 +111,7 @@ def test_modes_have_names_and_free_spins_are_no_vibrations():
     assert (found.free, found.error) == (2, 0.0)
     assert found.leading[0] == "hinge.angle"
     assert {"rod: first bending, y", "rod: first bending, z"} <= set(found.leading)
-    lines = table_of_modes(found)
+    lines = fd.Linearise().report(as_result(scene, found))
     assert "free" in lines[0]
     assert not any("whirl" in line for line in lines)
     assert fd.linearise(rotor(speed, stiffening=True)).driven == ("motor",)

@@ -42,6 +42,11 @@ DOUBLE = replace(pendulum(bar("upper"), bar("lower")), gravity=(0, -9.81, 0))
 PERIOD = 2 * np.pi
 
 
+def stopped(lower: float) -> Scene:
+    stop = JointStop("stop", "hinge", stiffness=1e4, entry=1e-3, lower=lower)
+    return replace(HINGED, forces=(stop, JointSpring("spring", "hinge", stiffness=1e3)))
+
+
 def driven(amplitude: float, omega: float) -> Scene:
     return replace(HINGED, drivers=(Driver("drive", "hinge", harmonic(amplitude=amplitude, frequency=omega / PERIOD)),))
 
@@ -245,6 +250,12 @@ RAISED = [
             partial(forward, h=1e-4, rows=1),
             partial(stepped, h=1e-4, rows=1),
         )
+    ),
+    (
+        doubts.KINK,
+        "'stop' has a kink just at this state",
+        partial(at_once, linearise, stopped(lower=0.0)),
+        partial(at_once, linearise, stopped(lower=-0.01)),
     ),
     *(
         (doubts.MASS, "'body' is nearly singular", partial(analyse, heavy(2e-9)), partial(analyse, heavy(0.1)))

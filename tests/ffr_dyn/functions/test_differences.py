@@ -33,6 +33,15 @@ def test_a_jump_is_what_the_first_step_tells():
     assert errors[0, 0] > 0.3 * found[0, 0]
 
 
+@pytest.mark.parametrize("width", [1e-3, 1e-5, 1e-6])
+def test_what_grows_from_zero_on_one_side_has_no_slope_yet(width):
+    """A parabola that ends in its tangent, as a stop is entered: it is no jump, whose derivative grows with smaller steps."""
+    found, _ = differences(
+        lambda y: np.array([np.where(y[0] < width, max(y[0], 0.0) ** 2 / (2 * width), y[0] - width / 2)]), STEPS, [0]
+    )
+    assert abs(found[0, 0]) < 1e-3
+
+
 def test_a_function_that_is_not_defined_a_first_step_away():
     found, _ = differences(lambda y: np.array([math.log(1e-7 - y[0]), math.sqrt(1e-8 + y[0])]), STEPS, [0])
     np.testing.assert_allclose(found[:, 0], [-1e7, 0.5e4], rtol=1e-6)

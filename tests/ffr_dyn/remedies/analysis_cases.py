@@ -40,9 +40,7 @@ from ffr_dyn.analyses.mixed import Causal, mixed
 from ffr_dyn.analyses.reference import IDA, SciPy, reference
 from ffr_dyn.analyses.settings import MomentSettings, Settings
 from ffr_dyn.analyses.static import static
-from ffr_dyn.compile.scene_tables import compile_scene
 from ffr_dyn.consistency.assemble import assemble
-from ffr_dyn.consistency.force_jacobian import force_jacobian
 from ffr_dyn.functions.formula import formula
 from ffr_dyn.functions.time_functions import polynomial
 from ffr_dyn.integrators import RK4, ROS2, ROS3, DormandPrince, HalfExplicit, tolerances
@@ -212,11 +210,6 @@ def diverging(moment: float) -> Result:
     return run(replace(CLOUD, loads=(Load("far", "cloud.b", moment=(0, 0, moment)),)), RK4(1e-4), end=0.3)
 
 
-def derived(law: Callable[..., object]) -> object:
-    scene = replace(HINGED, loads=(Load("gust", "bar.b", function=law),))
-    return force_jacobian(compile_scene(scene), 0.0, np.array([0, 0, 0, 1.0, 0, 0, 0]), np.zeros(6))
-
-
 def beside(t: float, state: object) -> tuple[float, float, float]:
     """A force that has a value at rest alone."""
     return (0, 0, 0) if state.omega_bar("bar")[2] == 0 else (np.nan, 0, 0)
@@ -314,7 +307,6 @@ OTHER = [
     Case(lambda: weighed(lambda t, state: 1 / 0), lambda: weighed(lambda t, state: (0.1, 0, 0))),
     Case(lambda: weighed(lambda t, state: (np.nan, 0, 0)), lambda: weighed(lambda t, state: (0.1, 0, 0))),
     Case(p(shrinking, 1.0), p(shrinking, 0.4)),
-    Case(lambda: derived(lambda t, state: 1 / 0), lambda: derived(lambda t, state: (0.1, 0, 0))),
     Case(p(felt, beside), lambda: felt(lambda t, state: (0.1, 0, 0))),
     Case(p(pinned, (50.0, 0, 0)), p(pinned, APART)),
     Case(p(pushed, 0.0), p(pushed, 0.3)),

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from force_jacobian import applied_forces, force_jacobian, small_motion
 from places import ROOT
 from synthetic import cloud
 from test_dyn_kernels import chain, moved, random_state
@@ -16,7 +17,6 @@ from ffr_dyn.analyses.states import scene_at
 from ffr_dyn.compile.engine import evaluate_at, load_at, new_engine
 from ffr_dyn.compile.scene_tables import compile_scene
 from ffr_dyn.consistency.assemble import assemble
-from ffr_dyn.consistency.force_jacobian import applied_forces, force_jacobian, small_motion
 from ffr_dyn.equations.forces import applied, gravity_forces, stretch
 from ffr_dyn.equations.inertia import mass_matrix
 from ffr_dyn.equations.layout import layout

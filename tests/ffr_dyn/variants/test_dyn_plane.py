@@ -11,7 +11,7 @@ import pytest
 
 import ffr_prep as fp
 from ffr_dyn.analyses.integration import integrate
-from ffr_dyn.consistency.assemble import assemble, flattened, plane_in_words
+from ffr_dyn.consistency.assemble import assemble, flat_form, flattened
 from ffr_dyn.functions.rotation import euler_parameters, rotation_matrix
 from ffr_dyn.functions.time_functions import harmonic, polynomial
 from ffr_dyn.integrators import RK4, ROS2
@@ -385,7 +385,7 @@ def test_bores_a_hair_off_are_in_the_plane(plane, beside):
     ],
 )
 def test_why_a_scene_is_computed_in_space(make, why):
-    assert re.search(why, plane_in_words(make(), 0.0))
+    assert re.search(why, flat_form(make(), 0.0).computed)
 
 
 def test_a_mode_that_mixes_the_plane_is_named(link):

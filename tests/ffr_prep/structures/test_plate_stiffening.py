@@ -18,7 +18,7 @@ from ffr_prep.reduction.methods.craig_bampton import CraigBampton
 from ffr_prep.structures.element_families import families
 from ffr_prep.structures.frame import Frame, Shell, panel, triangulated
 from ffr_prep.structures.model import assemble_frame, element_values
-from ffr_prep.structures.plate_stiffening import stiffness_of_forces
+from ffr_prep.structures.plate_stiffening import of_membrane_forces, shape_gradient
 from ffr_prep.structures.plates import element_coordinates, plates
 
 STEEL = Material("steel", 2.1e11, 0.3, 7850.0)
@@ -48,7 +48,7 @@ def test_buckling_of_a_simply_supported_square_plate(forces, factor, elements, c
         e = element_coordinates(made) @ element_values(part, q)
         tensor = np.array([(forces[0], forces[2]), (forces[2], forces[1])])
         in_element_axes = made.C[:, :2, :2].transpose(0, 2, 1) @ tensor @ made.C[:, :2, :2]
-        K_sigma = stiffness_of_forces(made, in_element_axes[:, None, [0, 1, 0], [0, 1, 1]], e)
+        K_sigma = of_membrane_forces(*shape_gradient(made, e), in_element_axes[:, None, [0, 1, 0], [0, 1, 1]])
         K = assemble_frame(frame, [part]).K[free][:, free].toarray()
         return 1 / scipy.linalg.eigvalsh(-K_sigma, K).max()
 

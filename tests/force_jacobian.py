@@ -1,4 +1,4 @@
-"""How the applied forces change with position and velocity: for static, linearised and implicit analyses."""
+"""How the applied forces change with position and velocity, by differences of the compiled ones: to compare with."""
 
 from __future__ import annotations
 

@@ -1,0 +1,110 @@
+"""Forces that have a kink, or jump, at the state that is linearised: on its two sides their slopes differ.
+
+Such are a stop whose edge is just touched, a servo just at its limit, the corner of a tabulated spring at its free length, a
+cable that is just taut. Small motions about the state are then not linear, however small they are, and the slope by central
+differences, the mean of both sides, belongs to neither.
+
+Slopes are looked at along what a law is a function of: the coordinates of its place and their rates, and the motions and
+velocities of all bodies where it looks at the state.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from ffr_dyn.equations.forces import At
+from ffr_dyn.equations.forces_at_rest import FAR, Watched, law_on
+from ffr_dyn.equations.jets import coordinates
+from ffr_dyn.equations.layout import moved, to_global_axes
+from ffr_dyn.equations.placed import Sums, all_placed, nothing_on, pair
+from ffr_dyn.functions.differences import NOT_DEFINED
+from ffr_dyn.scene.force_kinds import forces_of
+from ffr_dyn.scene.forces.force import Force
+from ffr_dyn.scene.forces.places import AtMarker, OnBody
+from ffr_prep.common.arrays import Array
+
+STEP = 1e-6  # m, rad, m/s, rad/s: how near a kink is at the state
+SMALLER = 0.1  # by which the step becomes smaller: a smooth slope then changes by as much less
+KEPT = 0.5  # of the change of a slope by a kink, in spite of that
+BENT, STEEP = 1e-3, 0.1  # of a slope: a change by a kink that counts, and one that counts although it is smooth
+ROUNDING = 64 * np.finfo(float).eps  # of forces, over the step
+POSITION, VELOCITY = "position", "velocity"
+
+
+def kinked_forces(now: At) -> list[str]:
+    """Notes on the forces that have a kink at a state, a sentence each."""
+    total = nothing_on(all_placed(now), now.place.v_size)
+    return [_told(force, by) for force in forces_of(now.scene) if (by := _kinks(total, now, force))]
+
+
+def _told(force: Force, by: list[str]) -> str:
+    return (
+        f"force {force.name!r} has a kink just at this state: by {' and '.join(by)} it changes otherwise on one side than on "
+        "the other. Small motions are not linear here: frequencies and damping, by the mean of both sides, hold for neither. "
+        "Start farther from the kink than the scene moves, or look at the motion itself with `run`"
+    )
+
+
+def _kinks(total: Sums, now: At, force: Force) -> list[str]:
+    """By what a force has a kink: "position", "velocity"."""
+    laws = list(_laws(total, now, force))
+    return [
+        by for by in (POSITION, VELOCITY) if any(kind == by and has_kink(law, n, far) for kind, law, n, far in laws)
+    ]
+
+
+def _laws(total: Sums, now: At, force: Force) -> Iterator[tuple[str, Callable[[Array], Array], int, float]]:
+    """Functions of changes of position, or velocity, that give the force, of how many, and how large these are already."""
+    place, size, inside = now.place, now.place.v_size, now.velocities
+    ends, c, rate = force.place.ends(now.scene), np.zeros(0), np.zeros(0)
+    if not isinstance(force.place, AtMarker | OnBody):
+        jets = coordinates(now.scene, pair(*(total.placed[number] for number in ends)), force.place)
+        if not jets:
+            return
+        c = np.array([float(jet.value) for jet in jets])
+        rate = total.gradient(ends, np.array([jet.first for jet in jets])) @ inside
+        yield POSITION, lambda step: law_on(force, now, c + step, rate), c.size, float(np.abs(c).max())
+        yield VELOCITY, lambda step: law_on(force, now, c, rate + step), c.size, float(np.abs(rate).max())
+    law, watched = partial(_in_state, force, c, rate), Watched(now.scene, place, now.t, now.x, now.v, [])
+    law(watched)
+    if watched.looks or isinstance(force.place, OnBody):
+        yield POSITION, lambda step: law(replace(now, x=moved(place, now.x, step))), size, 1.0
+        yield VELOCITY, lambda step: law(replace(now, v=to_global_axes(place, now.x, inside + step))), size, 1.0
+
+
+def _in_state(force: Force, c: Array, rate: Array, now: At) -> Array:
+    """(K,) the force as a function of the state, at coordinates that stay what they are."""
+    if isinstance(force.place, OnBody):
+        b = force.place.ends(now.scene)[0]
+        return np.ravel(force.law(now, now.x[now.place.q(b)], now.v[now.place.q_dot(b)]))
+    return law_on(force, now, c, rate) if c.size else np.ravel(force.law(now, None, None))
+
+
+def has_kink(function: Callable[[Array], Any], size: int, far: float) -> bool:
+    """Whether a function of `size` changes, of what is as large as `far`, has slopes that differ on the two sides of zero, or
+    from each other within the step."""
+    h, here = STEP * max(1.0, FAR * far), np.ravel(function(np.zeros(size)))
+    for direction in np.eye(size):
+        try:
+            bends = [_bend(function, here, step * direction) for step in (h, SMALLER * h)]
+        except NOT_DEFINED:
+            continue
+        (wide, slope, other, _), (narrow, _, _, rounding) = bends
+        kink = narrow > np.maximum(KEPT * wide, BENT * slope)
+        if ((kink | (other < (1 - STEEP) * slope)) & (narrow > rounding)).any():
+            return True
+    return False
+
+
+def _bend(function: Callable[[Array], Any], here: Array, step: Array) -> tuple[Array, Array, Array, Array]:
+    """(K,) each: by how much slopes on both sides differ, the larger and the smaller one, and the rounding of both."""
+    h = float(np.abs(step).max())
+    ahead, behind = np.ravel(function(step)), np.ravel(function(-step))
+    sides = np.abs(ahead - here) / h, np.abs(here - behind) / h
+    size = np.maximum(np.maximum(np.abs(ahead), np.abs(behind)), np.abs(here))
+    return np.abs(ahead + behind - 2.0 * here) / h, np.maximum(*sides), np.minimum(*sides), ROUNDING * size / h
