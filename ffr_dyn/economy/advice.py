@@ -15,7 +15,17 @@ import numpy as np
 from ffr_dyn.economy.result import Economy
 from ffr_dyn.scene.scene import Body
 
-_OWN = ("--unit", "--set", "--solid", "--material", "--interface", "--reference")  # options that stay what they are
+_OWN = (
+    "--unit",
+    "--units",
+    "--set",
+    "--solid",
+    "--material",
+    "--interface",
+    "--group",
+    "--surface",
+    "--reference",
+)  # options that stay what they are
 
 
 def advice(found: Economy) -> list[str]:
@@ -36,14 +46,18 @@ def _line(found: Economy, b: int, body: Body) -> str:
 
 
 def _command(body: Body, method: str, frequency: str = "", *, linear: bool = False, stress: bool = False) -> str:
-    """How a body is made, by the command that made it: of a structure file by its entries."""
-    if _words(body)[:1] == ["reduce-structure"]:
+    """How a body is made, by the command that made it: of a structure file by its entries; in words where none did."""
+    maker, flags = _words(body)[:1], [key for key, given in (("linear", linear), ("stress", stress)) if given]
+    if maker == ["reduce-structure"]:
         asked = f'reduction = {{method = "{method}"{f", frequency = {frequency}" if frequency else ""}}}'
-        flags = "".join(f", {key} = true" for key, given in (("linear", linear), ("stress", stress)) if given)
-        return f"{asked}{flags} in its structure FILE, and ffr-prep reduce-structure FILE -o {body.name}.ffr"
-    band = f" --frequency {frequency}" if frequency else ""
-    flags = "".join(f" --{key}" for key, given in (("linear", linear), ("stress", stress)) if given)
-    return f"ffr-prep reduce FILE{_own_options(body)} --method {method}{band}{flags} -o {body.name}.ffr"
+        entries = "".join(f", {key} = true" for key in flags)
+        return f"{asked}{entries} in its structure FILE, and ffr-prep reduce-structure FILE -o {body.name}.ffr"
+    if maker in (["reduce"], ["reduce-matrices"]):
+        band = f" --frequency {frequency}" if frequency else ""
+        options = "".join(f" --{key}" for key in flags if maker == ["reduce"])
+        return f"ffr-prep {maker[0]} FILE{_own_options(body)} --method {method}{band}{options} -o {body.name}.ffr"
+    band = f" with modes up to {frequency} Hz" if frequency else ""
+    return " and ".join([f"reduce it again, where it was made, by {method}{band}", *(f"{key} = true" for key in flags)])
 
 
 def _words(body: Body) -> list[str]:
@@ -54,7 +68,7 @@ def _words(body: Body) -> list[str]:
 def _own_options(body: Body) -> str:
     """What the geometry, the material and the interfaces of a body were told with."""
     words = _words(body)
-    own = [(word, value) for word, value in pairwise(words) if word in _OWN and words[0] == "reduce"]
+    own = [(word, value) for word, value in pairwise(words) if word in _OWN and words[0] != "reduce-structure"]
     made = own or [("--interface", interface.name) for interface in body.model.interfaces]
     return "".join(f" {word} {quote(value)}" for word, value in made)
 

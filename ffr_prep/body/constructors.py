@@ -75,12 +75,17 @@ def _rigid(
     )
 
 
-def check_point(what: str, name: str, at: ArrayLike) -> None:
-    """BodyError for a point whose name no quantity could carry, or that is so far away that products of lengths overflow."""
+def require_name(what: str, name: str) -> None:
+    """BodyError for a name of an interface or a point that no quantity could carry."""
     if not name or "." in name or not name.isprintable():
         raise BodyError(
             f"{what} {name!r} cannot be called so: a name has no dot and no line break, and a letter at least"
         )
+
+
+def check_point(what: str, name: str, at: ArrayLike) -> None:
+    """BodyError for a point whose name no quantity could carry, or that is so far away that products of lengths overflow."""
+    require_name(what, name)
     if not np.abs(np.asarray(at, float)).max() < _MOST:
         raise BodyError(f"{what} {name!r} is at {np.asarray(at, float).tolist()} m: coordinates are below {_MOST:g} m")
 

@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import scipy.sparse as sp
 
+from ffr_prep.body.constructors import require_name
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 from ffr_prep.model.coupled import InterfaceRegion
@@ -55,11 +56,13 @@ def six_rows(motion: Array, columns: Array, size: int) -> sp.csr_array:
 
 
 def check_names(interfaces: Sequence[InterfaceRegion]) -> None:
-    """Raises InputError for texts in the place of interfaces, and for repeated names."""
+    """Raises InputError for texts in the place of interfaces, for names that no quantity could carry, and repeated ones."""
     texts = [interface for interface in interfaces if isinstance(interface, str)]
     if texts:
         raise InputError(f"interface {texts[0]!r} is a text; write InterfaceRegion({texts[0]!r})")
     names = [interface.name for interface in interfaces]
+    for name in names:
+        require_name("interface", name)
     repeated = sorted({name for name in names if names.count(name) > 1})
     if repeated:
         raise InputError(f"interface name {repeated[0]!r} is given more than once: every interface needs its own name")

@@ -659,10 +659,25 @@ def test_the_report_says_it_all(fast, tmp_path):
 
 
 def test_advice_is_a_command_to_run(fast):
-    lines = advice(fast)
+    lines = advice(made_by(fast, "reduce", "rod.msh"))
     assert lines[0].startswith("crank: rigid is enough")
     assert "ffr-prep reduce FILE --interface a --interface b --method craig-bampton --frequency" in lines[1]
     assert "--stress" in lines[1]
+
+
+def test_advice_on_what_no_command_made_is_in_words(fast):
+    """Of Python, of other programs, and with another frame since."""
+    lines = advice(fast)
+    assert "mass, inertia and interfaces do: reduce it again, where it was made, by guyan" in lines[0]
+    assert re.search(
+        r"reduce it again, where it was made, by craig-bampton with modes up to \d+ Hz.* and stress = true", lines[1]
+    )
+
+
+def test_advice_on_matrices_is_their_command(fast):
+    line = advice(made_by(fast, "reduce-matrices", "rod.mtx", "--units", "mm-t-s", "--interface", "a=7"))[1]
+    assert "ffr-prep reduce-matrices FILE --units mm-t-s --interface a=7 --method craig-bampton --frequency" in line
+    assert "--stress" not in line
 
 
 def made_by(found, *command):

@@ -645,7 +645,7 @@ def advised(policy: Policy, size: float) -> list[str]:
     """Highest frequency, band and mesh advised for a body of which the first mode stays, and the second would do so much."""
     left = effects(size)
     line = advice._line(found_by(policy, effects=replace(left, mode=left.mode + 1)), 0, SCENE.bodies[0])
-    return re.findall(r"(?:up to|--frequency|at most) (\S+)", line)
+    return re.findall(r"(?:up to|at most) (\S+)", line)
 
 
 @dataclass(frozen=True)
