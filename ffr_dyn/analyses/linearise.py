@@ -509,7 +509,8 @@ def _lines_of_modes(
     still = [f"{'free':>12}                                                    {name}" for name in leading[:free:2]]
     rows = zip(parts[free:], frequencies[free:], ratios[free:], seen[free:], whirl[free:], leading[free:], strict=True)
     return still + [
-        f"{frequency:12.6g} Hz   damping {ratio:9.3g}   real part {real:11.4g} 1/s   {name}{_whirling(ground, share)}"
+        f"{frequency:12.6g} Hz   damping {ratio + 0.0:9.3g}   real part {real + 0.0:11.4g} 1/s   "
+        f"{name}{_whirling(ground, share)}"
         for (real, imag), frequency, ratio, ground, share, name in rows
         if imag >= 0
     ]

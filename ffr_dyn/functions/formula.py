@@ -232,7 +232,7 @@ class _Reader:
 
 def _nearest(name: str, known: Mapping[str, Any] | list[str]) -> str:
     close = difflib.get_close_matches(name, list(known), 1)
-    return f"; did you mean {close[0]!r}?" if close else f"; known are: {', '.join(known) or 'none'}"
+    return f"; did you mean {close[0]!r}?" if close else f"; known are: {', '.join(dict.fromkeys(known)) or 'none'}"
 
 
 # ---- back to text -------------------------------------------------------------------------------------------------

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +17,7 @@ from ffr_prep.mesh.formats import format_of
 from ffr_prep.mesh.geometry.face import METRES
 from ffr_prep.mesh.geometry.face_files import skin_faces
 from ffr_prep.mesh.geometry.faces import Faces
-from ffr_prep.mesh.geometry.regions import found
+from ffr_prep.mesh.geometry.regions import found, names_of
 from ffr_prep.mesh.geometry.skin import mesh_faces
 from ffr_prep.mesh.gmsh_files import skin_from_gmsh
 from ffr_prep.mesh.mesh import Mesh, cad_settings, check_mesh, check_request, read_mesh
@@ -43,7 +43,8 @@ def rigid_part(
         fp.save_body(pin, "pin.ffr")
 
     density    : [kg/m^3]; where solids overlap each of them counts, which is noted
-    interfaces : points at which joints and forces attach: at the centroid of the faces of a region, or at its own point
+    interfaces : points at which joints and forces attach: at the centroid of the faces of a region, the middle of a
+                 set of nodes, or at its own point
     name       : of the body; that of the file without it
     other arguments as of `read_mesh`
 
@@ -58,8 +59,9 @@ def rigid_part(
         raise InputError(f"the density is {density} kg/m^3; it must be positive")
     Material("of the part", 1.0, 0.0, density)  # refuses what no solid has
     check_request(path, unit, None, numbers, 1)
-    faces, solid, twice = _geometry(path, unit, numbers, solids)
-    points = {interface.name: _place(faces, interface) for interface in interfaces}
+    part = _geometry(path, unit, numbers, solids)
+    faces, solid = part.faces, part.solid
+    points = {interface.name: _place(part, interface) for interface in interfaces}
     if len(points) < len(interfaces):
         raise InputError("two interfaces have the same name: give each a name of its own")
     body = rigid_body(
@@ -72,15 +74,23 @@ def rigid_part(
     )
     regions = [{"name": i.name, "region": i.region or i.name} for i in interfaces if i.point is None]
     source = {"file": path.name, "unit": faces.unit, "density": density}
-    notes = [*faces.notes, *twice, *density_doubts(density), *units_doubts(body)]
+    notes = [*faces.notes, *part.notes, *density_doubts(density), *units_doubts(body)]
     made = {"kind": "rigid", "source": source, "interfaces": regions, "notes": notes}
     return replace(body, provenance=made)
 
 
-def _geometry(
-    path: Path, unit: str | None, numbers: Mapping[str, float], solids: Sequence[str]
-) -> tuple[Faces, FileSolid, list[str]]:
-    """The faces; the volume, the centre and the inertia about it of all solids, in metres; notes on what counts twice."""
+@dataclass(frozen=True)
+class _Part:
+    """Faces; volume, centre and inertia about it of all solids, in metres; notes on what counts twice; the middle of each set
+    of nodes."""
+
+    faces: Faces
+    solid: FileSolid
+    notes: Sequence[str] = ()
+    node_groups: Mapping[str, Array] = field(default_factory=dict)
+
+
+def _geometry(path: Path, unit: str | None, numbers: Mapping[str, float], solids: Sequence[str]) -> _Part:
     if format_of(path).geometry:
         settings = cad_settings(path, glue=False, solids=solids)
         with reading(path, "a geometry"):
@@ -91,11 +101,12 @@ def _geometry(
                 FileSolid(s.name, s.label, s.volume * scale**3, s.centre * scale, s.inertia * scale**5)
                 for s in skin.solids
             ]
-            return skin_faces(skin), _together(known), _overlapping(skin.overlaps, skin.unit or "m")
+            return _Part(skin_faces(skin), _together(known), _overlapping(skin.overlaps, skin.unit or "m"))
     cad_settings(path, glue=False, solids=solids)
     mesh = read_mesh(path, unit=unit, numbers=numbers, order=2 if format_of(path).geometry else 1)
     check_mesh(mesh)
-    return mesh_faces(mesh), _integrated(mesh), []
+    middles = {name: mesh.points[nodes].mean(axis=0) for name, nodes in mesh.node_groups.items()}
+    return _Part(mesh_faces(mesh), _integrated(mesh), node_groups=middles)
 
 
 def _overlapping(overlaps: Sequence[tuple[str, str, float]], unit: str) -> list[str]:
@@ -125,12 +136,15 @@ def _integrated(mesh: Mesh) -> FileSolid:
     return FileSolid("", "", found.mass, found.r_dm / found.mass, np.trace(second) * np.eye(3) - second)
 
 
-def _place(faces: Faces, interface: InterfaceRegion) -> Array:
-    """The point of an interface."""
+def _place(part: _Part, interface: InterfaceRegion) -> Array:
+    """The point of an interface: its own, the centroid of its faces, or the middle of its nodes."""
+    faces, region = part.faces, interface.region or interface.name
     if interface.point is not None:
         return np.asarray(interface.point, float)
+    if region in part.node_groups and not any(region in names_of(face) for face in faces.faces):
+        return part.node_groups[region]
     try:
-        chosen = found(faces, interface.region or interface.name)
+        chosen = found(faces, region)
     except InputError as error:
         raise InputError(f"interface {interface.name!r}: {error}") from None
     areas = np.array([faces.faces[k].area for k in chosen])

@@ -89,6 +89,24 @@ def test_interfaces_are_where_their_faces_are(files, tmp_path):
     assert len(loaded.surface.triangles) > 100
 
 
+def test_an_interface_at_a_set_of_nodes_is_in_their_middle(tmp_path):
+    """As a mesh of Abaqus names them; `reduce` takes the same."""
+    nodes = [(0, 0, 0), (1, 0, 0), (1, 2, 0), (0, 2, 0), (0, 0, 3), (1, 0, 3), (1, 2, 3), (0, 2, 3)]
+    lines = [f"{k}, {x}, {y}, {z}" for k, (x, y, z) in enumerate(nodes, 1)]
+    text = [
+        "*NODE",
+        *lines,
+        "*ELEMENT, TYPE=C3D8, ELSET=ALL",
+        "1, 1, 2, 3, 4, 5, 6, 7, 8",
+        "*NSET, NSET=L",
+        "1, 4, 5, 8",
+    ]
+    (tmp_path / "block.inp").write_text("\n".join(text) + "\n")
+    body = fp.rigid_part(tmp_path / "block.inp", 1000.0, [fp.InterfaceRegion("L")], unit="m")
+    np.testing.assert_allclose(body.interfaces[0].position, (0, 1.0, 1.5), atol=1e-12)
+    assert body.mass == pytest.approx(6000.0)
+
+
 def test_a_rigid_part_swings_in_a_scene(files):
     """The period of small swings is 2 pi sqrt(J / (m g l))."""
     body = fp.rigid_part(files["plate"], RHO, [fp.InterfaceRegion("pin", "cylinder r=6mm at 45,25,0")])
