@@ -96,9 +96,9 @@ def _lowest_stiffness(at: Evaluator, assembled: Assembled, found: Equilibrium, t
     if not found.found and values[0] > 0:
         motion = named_motion(at.system.scene, at.system.layout, x, Z @ np.linalg.solve(K, Z.T @ found.balance.forces))
         raise ComputationError(
-            f"no equilibrium was found in {len(found.steps)} steps, though what moves is held: the start is too far from one, "
-            f"or a force jumps, has a kink or a pole near there, along {motion}; start nearer to an equilibrium, or look at "
-            "the forces and formulas that act on it"
+            f"no equilibrium was found in {len(found.steps)} steps, though what moves is held: the start is too far from "
+            f"one, or a force jumps, has a kink or a pole near there, along {motion}; start nearer to an equilibrium, or "
+            "look at the forces and formulas that act on it"
         )
     if not found.found and rigid_freedom(assembled.system.scene, assembled, time):
         raise _not_held(assembled, time, x, Z @ vectors[:, 0], f"no equilibrium was found in {len(found.steps)} steps")

@@ -138,12 +138,13 @@ def load_tables(scene: Scene, functions: FunctionTable) -> Loads:
     for force in forces_of(scene):
         rows.append((kernels.index(force.kernel), *_row(scene, force, numbers, len(initial))))
         initial += force.place.initial
+    kinks = [(k, kink) for k, force in enumerate(forces_of(scene)) for kink in force.kinks]
     return Loads(
         row=np.array(rows, dtype=np.int64).reshape(-1, 11),
         data=np.array(numbers.data, dtype=float),
         initial=np.array(initial, dtype=float),
-        kinked=np.array([k for k, force in enumerate(forces_of(scene)) for _ in force.kinks], dtype=np.int64),
-        kinks=np.array([kink for force in forces_of(scene) for kink in force.kinks], dtype=float).reshape(-1, 4),
+        kinked=np.array([(k, kink.number) for k, kink in kinks], dtype=np.int64).reshape(-1, 2),
+        kinks=np.array([kink[:4] for _, kink in kinks], dtype=float).reshape(-1, 4),
     )
 
 

@@ -242,7 +242,7 @@ def _rigid_inertia(moments: bytes, mass: float, normal: int) -> tuple[Array, Arr
 
 
 def _load_work(m: Model, V: int, X: int) -> LoadWork:
-    kinks = m.loads.kinked.size
+    kinks = len(m.loads.kinked)
     return LoadWork(
         reference=np.zeros(m.loads.initial.size),
         measured=np.zeros(m.loads.initial.size),

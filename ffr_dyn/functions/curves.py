@@ -11,6 +11,10 @@ from ffr_prep.common.arrays import Array
 from ffr_prep.common.brief import Brief
 from ffr_prep.common.errors import InputError
 
+SHORT = 0.05  # of a curve: a piece that may be shorter than what a step moves by
+MUCH = 0.25  # of the steepest slope: a change that a step must not pass unseen
+WITHIN = 8  # steps at least over a short piece with such a change
+
 
 @dataclass(frozen=True, repr=False)
 class Curve(Brief):
@@ -37,6 +41,25 @@ class Curve(Brief):
         for key, array in (("at", at), ("values", values)):
             array.setflags(write=False)
             object.__setattr__(self, key, array)
+
+
+def corners(curve: Curve) -> list[float]:
+    """Where the slope of a curve changes much over a short way: places that steps end at, and within such a way more of them.
+
+    A way is a piece that is short beside all of the curve. Over many small pieces the slope counts as changed where the
+    change since the last corner is large.
+    """
+    widths, slopes = np.diff(curve.at), np.diff(curve.values) / np.diff(curve.at)
+    much, short = MUCH * np.abs(slopes).max(), widths < SHORT * (curve.at[-1] - curve.at[0])
+    found, last = list[float](), slopes[0]
+    for k in range(1, len(slopes)):
+        if abs(slopes[k] - last) > much:
+            last = slopes[k]
+            found += [curve.at[k]] if short[k - 1] or short[k] else []
+    for k in range(1, len(slopes) - 1):
+        if short[k] and abs(slopes[k + 1] - slopes[k - 1]) > much:
+            found += np.linspace(curve.at[k], curve.at[k + 1], 1 + WITHIN)[1:-1].tolist()
+    return sorted(map(float, found))
 
 
 def pieces(curve: Curve) -> Array:

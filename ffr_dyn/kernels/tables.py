@@ -174,7 +174,9 @@ class Loads(NamedTuple):
     row: I2  # (F, 11) see `KERNEL` and what follows it
     data: F1  # pooled numbers of places, laws and curves
     initial: F1  # (O,) what is measured, before the start: angles count their turns from there
-    kinked: I1  # (K,) the force of each kink (see `ffr_dyn.kernels.forces.kinks`)
+    kinked: (
+        I2  # (K, 2) the force of each kink (see `ffr_dyn.kernels.forces.kinks`), and which of its coordinates has it
+    )
     kinks: F2  # (K, 4) a, b, c, d: it is where a + b coordinate + c rate + d coordinate rate is zero
 
 

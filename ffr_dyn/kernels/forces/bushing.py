@@ -204,15 +204,22 @@ def keep_rows(r, k, turn, x):
         number += 1
 
 
+@kernel
+def measure_six(r, k):
+    """Displacement and rate of bushing k into what is measured of it; returns what `measure_bushing` does."""
+    w, s, loads = r.work.markers, r.work.loads, r.model.loads
+    i, j = loads.row[k, END_I], loads.row[k, END_J]
+    move_axes(part(loads.data, loads.row[k, PLACE], 18), w, s.axes, i, j)
+    relate(s.axes, s.turn)
+    return measure_bushing(w, s, i, j, part(s.measured, loads.row[k, MEASURED], 18))
+
+
 @force_kernel
 def bushing(r: Tables, k: int, x: Vector, f: Vector) -> int:
     """Adds the bushing to f, and keeps displacement, rate and force."""
     m, w, s, loads = r.model, r.work.markers, r.work.loads, r.model.loads
     where, markers, i, j = m.bodies.where, m.markers, loads.row[k, END_I], loads.row[k, END_J]
-    frames, six = part(loads.data, loads.row[k, PLACE], 18), part(s.measured, loads.row[k, MEASURED], 18)
-    move_axes(frames, w, s.axes, i, j)
-    relate(s.axes, s.turn)
-    turn = measure_bushing(w, s, i, j, six)
+    turn, six = measure_six(r, k), part(s.measured, loads.row[k, MEASURED], 18)
     six_forces(loads.data, loads.row[k, LAW], six)
     own = vector_at(f, r.v.size)
     side_i, side_j = displacement_sides(w, s.axes, i, j, (six[12], six[13], six[14]))

@@ -6,15 +6,16 @@ in pieces, the first of which ends there. The cubic through coordinates and rate
 piece that passes the kink by more than a small part of a step is done again, shorter; after one that ends before it the next
 looks again.
 
-A kink is where  a + b x + c x_dot + d x x_dot  changes its sign; x is the coordinate of the force.
+A kink is where  a + b x + c x_dot + d x x_dot  changes its sign; x is a coordinate of the force.
 
 Twin: the statement above, held by
 `tests/ffr_dyn/integrators/test_steps_at_kinks.py::test_a_method_keeps_its_order_over_an_impact`.
 """
 
+from ffr_dyn.kernels.forces.bushing import measure_six
 from ffr_dyn.kernels.forces.coordinate import coordinate_of
 from ffr_dyn.kernels.options import inlined, kernel
-from ffr_dyn.kernels.tables import OK, RESTART, H
+from ffr_dyn.kernels.tables import MEASURED, OK, RESTART, SIX, WAY, H
 from ffr_dyn.kernels.vectors import copy
 
 AT_KINK = 1e-4  # of a step: a kink so near to an end is there
@@ -28,10 +29,18 @@ BEFORE, BEHIND = 0, 2  # columns of `LoadWork.passing`
 @inlined
 def measure_kinks(r, column):
     """Keep coordinates and rates of forces that have kinks, from the markers."""
-    loads, passing = r.model.loads, r.work.loads.passing
-    for number in range(loads.kinked.size):
-        value, rate, _ = coordinate_of(r, loads.kinked[number])
-        passing[number, column], passing[number, column + 1] = value, rate
+    loads, work = r.model.loads, r.work.loads
+    value, rate, before = 0.0, 0.0, -1
+    for number in range(len(loads.kinked)):
+        k, own = loads.kinked[number, 0], loads.kinked[number, 1]
+        six, at = loads.row[k, WAY] == SIX, loads.row[k, MEASURED]
+        if k != before and six:
+            measure_six(r, k)
+        elif k != before:
+            value, rate, _ = coordinate_of(r, k)
+        before = k
+        work.passing[number, column] = work.measured[at + own] if six else value
+        work.passing[number, column + 1] = work.measured[at + own + 6] if six else rate
 
 
 @kernel
@@ -48,7 +57,7 @@ def beyond_kink(kink, ends, span, s):
 def first_kink(loads, passing, span, near):
     """When the motion comes to a kink first, farther than `near` from both ends of a step of length `span`; or `span`."""
     first = span
-    for number in range(loads.kinked.size):
+    for number in range(len(loads.kinked)):
         kink, ends = loads.kinks[number], passing[number]
         before, part = near, (span - 2.0 * near) / LOOKS
         beyond = beyond_kink(kink, ends, span, before)

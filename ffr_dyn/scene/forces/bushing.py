@@ -8,12 +8,12 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from ffr_dyn.functions.curves import Curve, curve_slope, curve_value
+from ffr_dyn.functions.curves import Curve, corners, curve_slope, curve_value
 from ffr_dyn.functions.rotation import triad
 from ffr_dyn.scene.fields import Direction, Six
 from ffr_dyn.scene.force_kinds import register_force
 from ffr_dyn.scene.forces.checks import check_array, check_symmetric
-from ffr_dyn.scene.forces.force import Force, LawNumbers, LoadTable, Moment
+from ffr_dyn.scene.forces.force import Force, Kink, LawNumbers, LoadTable, Moment
 from ffr_dyn.scene.forces.places import BetweenAxes
 from ffr_dyn.scene.forces.spring_law import elastic_energy
 from ffr_prep.common.arrays import Array
@@ -104,6 +104,12 @@ class Bushing(Force):
         curves = [0.0 if curve is None else curve_value(curve, x) for curve, x in zip(self.curves, c, strict=True)]
         force: Array = np.array(self.preload) - self.stiffness_matrix @ c - self.damping_matrix @ rate - curves
         return force
+
+    @property
+    def kinks(self) -> tuple[Kink, ...]:
+        return tuple(
+            Kink(-at, number=k) for k, curve in enumerate(self.curves) if curve is not None for at in corners(curve)
+        )
 
     @property
     def stiff_coordinates(self) -> tuple[int, ...]:

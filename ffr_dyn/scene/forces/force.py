@@ -10,7 +10,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar, NamedTuple, Protocol
 
 import numpy as np
 
@@ -55,8 +55,14 @@ class LawNumbers:
     user: int = -1
 
 
-# (a, b, c, d) of where a law has a kink: a + b coordinate + c rate + d coordinate rate = 0.
-Kink = tuple[float, float, float, float]
+class Kink(NamedTuple):
+    """Where a law has a kink: a + b coordinate + c rate + d coordinate rate = 0, of the coordinate of this number."""
+
+    a: float
+    b: float = 1.0
+    c: float = 0.0
+    d: float = 0.0
+    number: int = 0
 
 
 class Force(ABC):
@@ -98,7 +104,7 @@ class Force(ABC):
 
     @property
     def kinks(self) -> tuple[Kink, ...]:
-        """Where the law has a kink, of a force on one coordinate; steps of a fixed length end there."""
+        """Where the law has a kink; steps of a fixed length end there."""
         return ()
 
     @property

@@ -103,18 +103,18 @@ class JointStop(Force):
             if end is None:
                 continue
             depths = np.linspace(0.0, self.entry, 1 + ENTRY_STEPS).tolist()
-            found += [(-end - out * depth, 1.0, 0.0, 0.0) for depth in depths]
+            found += [Kink(-end - out * depth) for depth in depths]
             if self.damping > 0:
                 found += [self._pulls(end, out), self._pulls_in_entry(end, out)]
         return tuple(found)
 
     def _pulls(self, end: float, out: float) -> Kink:
         """stiffness (depth - entry / 2) + damping speed = 0"""
-        return -end - out * self.entry / 2, 1.0, self.damping / self.stiffness, 0.0
+        return Kink(-end - out * self.entry / 2, 1.0, self.damping / self.stiffness)
 
     def _pulls_in_entry(self, end: float, out: float) -> Kink:
         """stiffness entry / 2 + damping speed (3 - 2 depth / entry) = 0, times entry / (2 damping)"""
-        return self.stiffness * self.entry**2 / (4 * self.damping), 0.0, 1.5 * out * self.entry + end, -1.0
+        return Kink(self.stiffness * self.entry**2 / (4 * self.damping), 0.0, 1.5 * out * self.entry + end, -1.0)
 
     @property
     def stiff_coordinates(self) -> tuple[int, ...]:

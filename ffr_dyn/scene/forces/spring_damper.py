@@ -10,9 +10,9 @@ from ffr_dyn.functions.curves import Curve
 from ffr_dyn.scene.fields import Curved, In
 from ffr_dyn.scene.force_kinds import register_force
 from ffr_dyn.scene.forces.checks import check_damping, check_number, check_number_or_curve
-from ffr_dyn.scene.forces.force import Force, LawNumbers, LoadTable, Moment
+from ffr_dyn.scene.forces.force import Force, Kink, LawNumbers, LoadTable, Moment
 from ffr_dyn.scene.forces.places import AlongLine
-from ffr_dyn.scene.forces.spring_law import compiled_spring, spring_force, spring_slopes, stiff, stored
+from ffr_dyn.scene.forces.spring_law import compiled_spring, spring_force, spring_kinks, spring_slopes, stiff, stored
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 
@@ -64,6 +64,10 @@ class SpringDamper(Force):
 
     def law(self, now: Moment, c: float, rate: float) -> float:
         return spring_force(self.stiffness, self.damping, self.preload, c - self.free_length, rate)
+
+    @property
+    def kinks(self) -> tuple[Kink, ...]:
+        return spring_kinks(self.stiffness, self.damping, self.free_length)
 
     @property
     def stiff_coordinates(self) -> tuple[int, ...]:

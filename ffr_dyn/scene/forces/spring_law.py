@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from ffr_dyn.functions.curves import Curve, curve_integral, curve_slope, curve_value
-from ffr_dyn.scene.forces.force import LawNumbers, LoadTable
+from ffr_dyn.functions.curves import Curve, corners, curve_integral, curve_slope, curve_value
+from ffr_dyn.scene.forces.force import Kink, LawNumbers, LoadTable
 from ffr_prep.common.arrays import Array
 
 
@@ -26,6 +26,13 @@ def spring_slopes(stiffness: float | Curve, damping: float | Curve, stretch: flo
 def stiff(stiffness: float | Curve, damping: float | Curve) -> tuple[int, ...]:
     """The one coordinate of a spring, unless it is none."""
     return (0,) if any(isinstance(factor, Curve) or factor > 0 for factor in (stiffness, damping)) else ()
+
+
+def spring_kinks(stiffness: float | Curve, damping: float | Curve, free: float) -> tuple[Kink, ...]:
+    """Where the curves have corners."""
+    by_stretch = [Kink(-free - at) for at in corners(stiffness)] if isinstance(stiffness, Curve) else []
+    by_rate = [Kink(-at, 0.0, 1.0) for at in corners(damping)] if isinstance(damping, Curve) else []
+    return tuple(by_stretch + by_rate)
 
 
 def compiled_spring(

@@ -7,11 +7,13 @@ from functools import cache
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.interpolate import PchipInterpolator
 from scipy.optimize import brentq
 
 from ffr_dyn.analyses.forward import forward
+from ffr_dyn.functions.curves import Curve, corners
 from ffr_dyn.integrators import RK4, ROS2, ROS3, GeneralisedAlpha, HalfExplicit
-from ffr_dyn.scene.forces import JointStop
+from ffr_dyn.scene.forces import Bushing, JointSpring, JointStop, SpringDamper
 from ffr_dyn.scene.joints import Joint
 from ffr_dyn.scene.scene import Body, Scene
 from ffr_prep.body import rigid_body
@@ -32,29 +34,54 @@ def stop(stiffness, entry, damping):
     return JointStop("stop", "guide", stiffness=stiffness, entry=entry, damping=damping, coordinate="stroke", **ends)
 
 
+def backlash(stiffness, corner, end=0.01):
+    """A curve of a spring that is slack up to its ends, and stiff from a short corner on."""
+    steep, beyond = stiffness * corner / 2, stiffness * 0.1
+    at = np.array([end, end + corner, end + corner + 0.1])
+    return Curve([*-at[::-1], *at], [-steep - beyond, -steep, 0, 0, steep, steep + beyond])
+
+
+def spring(curve):
+    return JointSpring("stop", "guide", stiffness=curve, coordinate="stroke")
+
+
+def bushing(curve):
+    return Bushing("stop", "ground.o", "block.c", stiffness=[curve, 0, 0, 0, 0, 0])
+
+
+def catch(curve):
+    """Along a line that begins 1 m away, where a curve ends before."""
+    return SpringDamper("stop", "ground.far", "block.c", stiffness=curve, free_length=1.0)
+
+
 def between_stops(stiffness, entry, damping, speed):
     """A mass of 1 kg that slides without friction."""
+    return held_by(stop(stiffness, entry, damping), speed)
+
+
+def held_by(force, speed):
     guide = Joint("guide", "translational", "ground.o", "block.c", axis=(1, 0, 0))
-    body = Body("block", BLOCK, velocity=(speed, 0, 0))
-    return Scene((body,), (guide,), forces=(stop(stiffness, entry, damping),), ground={"o": (0, 0, 0)})
+    body, kind = Body("block", BLOCK, velocity=(speed, 0, 0)), {force.table: (force,)}
+    return Scene((body,), (guide,), ground={"o": (0, 0, 0), "far": (-1.0, 0, 0)}, **kind)
 
 
 @cache
 def true(name):
     """(T,) strokes, by another solver, whose steps no kink misleads: they are as fine as they must be."""
-    stiffness, entry, damping, speed = STOPS[name]
-    law = stop(stiffness, entry, damping).law
+    *numbers, speed = STOPS[name]
+    law = stop(*numbers).law
+    return solved(lambda x, v: law(None, x, v), speed)
 
-    def rates(t, y):
-        return [y[1], law(None, y[0], y[1])]
 
+def solved(force, speed):
     times = np.linspace(0, END, 1 + round(END / ROW))
-    return solve_ivp(rates, (0, END), [0, speed], t_eval=times, rtol=1e-11, atol=1e-14, max_step=1e-4).y[0]
+    how = {"t_eval": times, "rtol": 1e-11, "atol": 1e-14, "max_step": 1e-4}
+    return solve_ivp(lambda t, y: [y[1], force(*y)], (0, END), [0, speed], **how).y[0]
 
 
 def kink_of(kink, rate):
     """The coordinate of a kink at a rate; none of a kink that no coordinate comes to."""
-    a, b, c, d = kink
+    a, b, c, d = kink[:4]
     return -(a + c * rate) / (b + d * rate) if b + d * rate else np.nan
 
 
@@ -89,6 +116,37 @@ def test_errors_of_impacts_are_told(name):
         result = forward(between_stops(*STOPS[name]), end=END, output_step=ROW, **how)
         error = np.abs(result["block.c.position"][:, 0] - true(name)).max()
         assert 0.3 < result.attributes["errors"]["block.c.position"][0] / error < 8
+
+
+@pytest.mark.parametrize("kind", [spring, bushing, catch])
+@pytest.mark.parametrize(("stiffness", "corner", "speed"), [(1e6, 7e-6, 1.0), (2e6, 1.5e-6, 3.0), (5e5, 6e-4, 3.0)])
+def test_errors_at_corners_of_curves_are_told(kind, stiffness, corner, speed):
+    """As of stops; the second was off by 7 times what was told."""
+    curve = backlash(stiffness, corner)
+    through = PchipInterpolator(curve.at, curve.values)
+    true = solved(lambda x, v: -float(through(x)), speed)
+    for how in ({}, {"method": ROS2(ROW / np.ceil(20 * ROW * np.sqrt(stiffness))), "check": True}):
+        result = forward(held_by(kind(curve), speed), end=END, output_step=ROW, **how)
+        error = np.abs(result["block.c.position"][:, 0] - true).max()
+        assert 0.3 < result.attributes["errors"]["block.c.position"][0] / error < 8
+
+
+def test_smooth_curves_have_no_corners():
+    """Whatever they are given by, but for a few places where their slope has changed by much."""
+    for points, most in ((3, 0), (12, 0), (200, 16), (2000, 16)):
+        at = np.linspace(-np.pi, np.pi, points)
+        assert len(corners(Curve(at, np.sin(at)))) <= most
+        assert corners(Curve(at, 3 * at)) == []
+
+
+@pytest.mark.parametrize("count", [2, 20])
+def test_a_corner_is_found_however_it_is_given(count):
+    """By one piece, within which there are more places, or by many."""
+    at = np.linspace(0, 1e-4, count)
+    curve = Curve([-1.0, *at, 1.0], [0.0, *(at**2 / 2e-4), 1.0])
+    found = np.array(corners(curve))
+    assert ((found >= 0) & (found <= 1e-4)).all()
+    assert np.diff([0, *found, 1e-4]).max() < 0.5e-4
 
 
 @pytest.mark.parametrize(("method", "order"), [(ROS2, 2), (ROS3, 3), (HalfExplicit, 4), (GeneralisedAlpha, 2)])
