@@ -62,7 +62,7 @@ class JointSpring(Force):
 
     @property
     def kinks(self) -> tuple[Kink, ...]:
-        return spring_kinks(self.stiffness, self.damping, self.free)
+        return spring_kinks(self.stiffness, self.free)
 
     @property
     def stiff_coordinates(self) -> tuple[int, ...]:

@@ -67,7 +67,7 @@ class SpringDamper(Force):
 
     @property
     def kinks(self) -> tuple[Kink, ...]:
-        return spring_kinks(self.stiffness, self.damping, self.free_length)
+        return spring_kinks(self.stiffness, self.free_length)
 
     @property
     def stiff_coordinates(self) -> tuple[int, ...]:

@@ -28,11 +28,10 @@ def stiff(stiffness: float | Curve, damping: float | Curve) -> tuple[int, ...]:
     return (0,) if any(isinstance(factor, Curve) or factor > 0 for factor in (stiffness, damping)) else ()
 
 
-def spring_kinks(stiffness: float | Curve, damping: float | Curve, free: float) -> tuple[Kink, ...]:
-    """Where the curves have corners."""
-    by_stretch = [Kink(-free - at) for at in corners(stiffness)] if isinstance(stiffness, Curve) else []
-    by_rate = [Kink(-at, 0.0, 1.0) for at in corners(damping)] if isinstance(damping, Curve) else []
-    return tuple(by_stretch + by_rate)
+def spring_kinks(stiffness: float | Curve, free: float) -> tuple[Kink, ...]:
+    """Where the curve of the force has corners. Steps that ended at those of a curve of damping, whose slope implicit methods
+    take as a chord, would err more evenly, but by more than two of them differ by."""
+    return tuple(Kink(-free - at) for at in corners(stiffness)) if isinstance(stiffness, Curve) else ()
 
 
 def compiled_spring(
