@@ -25,7 +25,7 @@ from ffr_dyn.results.recorded_motion import View
 from ffr_dyn.scene.force_kinds import forces_of
 from ffr_dyn.scene.forces import JointStop
 from ffr_dyn.scene.forces.force import Force
-from ffr_dyn.scene.forces.places import COORDINATE, FORCE, RATE
+from ffr_dyn.scene.forces.places import COORDINATE, FORCE, RATE, AlongLine, OnJoint
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError
 
@@ -117,6 +117,9 @@ def _beside_stops(account: Account, rows: Record, steps: Array) -> Array:
     view, met = View(system, rows), np.zeros(rows.time.size, dtype=bool)
     for row, (k, stop) in enumerate(_stops(system)):
         c, rate = measured_values(view, k, COORDINATE), measured_values(view, k, RATE)
+        _note_missed(account, row, rows, (c, rate, measured_values(view, k, FORCE)), steps)
+        if not isinstance(stop, JointStop):
+            continue
         reach = REACHED * steps * np.abs(rate)
         near = stop.energy(c - reach) + stop.energy(c + reach) > 0
         met |= near & _conserves(stop)
@@ -124,13 +127,16 @@ def _beside_stops(account: Account, rows: Record, steps: Array) -> Array:
         at = int(np.argmax(speeds))
         if speeds[at] > account.stops["met"][row, 1]:
             account.stops["met"][row], account.stops["met.x"][row] = (rows.time[at], speeds[at]), rows.x[at]
-        _note_missed(account, row, rows, (c, rate, measured_values(view, k, FORCE)), steps)
     return met
 
 
-def _stops(system: System) -> list[tuple[int, JointStop]]:
-    """The stops of a scene with their numbers among its forces."""
-    return [(k, force) for k, force in enumerate(forces_of(system.scene)) if isinstance(force, JointStop)]
+def _stops(system: System) -> list[tuple[int, Force]]:
+    """What is met: stops, and springs whose curve has corners, with their numbers among the forces of a scene."""
+    return [
+        (k, force)
+        for k, force in enumerate(forces_of(system.scene))
+        if force.kinks and isinstance(force.place, OnJoint | AlongLine)
+    ]
 
 
 def _note_missed(account: Account, row: int, rows: Record, values: tuple[Array, Array, Array], steps: Array) -> None:
@@ -195,7 +201,7 @@ def _meeting(account: Account, row: int) -> tuple[float, float]:
     that do not bend: half a vibration, as deep as the energy of the approach goes, which damping of a ratio zeta leaves
     exp(-2 pi zeta / sqrt(1 - zeta^2)) of."""
     (time, rate), stop = account.stops["met"][row], _stops(account.system)[row][1]
-    if not rate > 0:
+    if not (rate > 0 and isinstance(stop, JointStop)):
         return np.inf, 0.0
     m, k = _mass_before(account.system, stop, float(time), account.stops["met.x"][row]), stop.stiffness
     energy = 0.5 * m * rate**2

@@ -43,6 +43,7 @@ from ffr_dyn.economy.selection import Insufficient, Selection, gap, selected_mod
 from ffr_dyn.economy.steps import Stepped, chosen_step
 from ffr_dyn.economy.verification import apart, reference_cost, sharpened, unheard, verified
 from ffr_dyn.integrators.stabilisation import Projection, Stabilisation
+from ffr_dyn.scene.force_kinds import forces_of
 from ffr_dyn.scene.scene import Scene
 from ffr_dyn.variants.mean_axis import in_new_frames
 from ffr_prep.common.arrays import Array
@@ -182,11 +183,12 @@ def _surely_rigid(ledger: Ledger, stiff: Rigid, omitted: Contributions) -> Chose
 
 
 def _acts_between_rows(trial: Trial, span: Span) -> bool:
-    """Whether a stop is met or a force comes and goes within a row: that sets off vibrations of which the loads at rows, that
-    the estimate goes by, know nothing."""
+    """Whether a stop is met, a spring may come to a corner of its curve, or a force comes and goes within a row: that sets
+    off vibrations of which the loads at rows, that the estimate goes by, know nothing."""
     steps = trial.choice.integrator(span.output_step)
     fast = fast_within(trial.made.assembled.system, steps, span.start, span.end, span.output_step)
-    return "meeting" in trial.result.attributes or (fast is not None and len(fast.spans) > 0)
+    cornered = any(force.kinks and not force.sudden for force in forces_of(trial.scene))
+    return cornered or "meeting" in trial.result.attributes or (fast is not None and len(fast.spans) > 0)
 
 
 def _with_step(ledger: Ledger, choice: Choice, model: Array, limits: Array) -> Stepped:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from functools import cache
 
 import numpy as np
@@ -129,6 +130,16 @@ def test_errors_at_corners_of_curves_are_told(kind, stiffness, corner, speed):
         result = forward(held_by(kind(curve), speed), end=END, output_step=ROW, **how)
         error = np.abs(result["block.c.position"][:, 0] - true).max()
         assert 0.3 < result.attributes["errors"]["block.c.position"][0] / error < 8
+
+
+@pytest.mark.parametrize(("force", "of"), [(spring, "force"), (catch, "tension")])
+def test_a_push_between_rows_is_told(force, of):
+    """As of a stop; all rows show zero."""
+    result = forward(held_by(force(backlash(1e6, 7e-6)), 1.0), end=0.05, output_step=0.01)
+    assert np.abs(result[f"stop.{of}"]).max() < 1e-6
+    assert any(
+        re.search(rf"stop\.{of} is 778 N between rows and \S+ N at most in them", n) for n in result.attributes["notes"]
+    )
 
 
 def test_smooth_curves_have_no_corners():
