@@ -106,19 +106,20 @@ def with_its_errors(runs: Runs, trial: Trial, other: Any, *longer: Any) -> Trial
     if runs.untold:
         order = OVER_BREAKS if trial.method.order == 3 else 1
     twins = (*trial.twins, *(twin for twin in longer if not has_failed(twin)))
-    errors, order = (
-        _felt(runs, trial, other, order, twins) if runs.feels else (_errors(trial.result, other, order, twins), order)
-    )
+    if runs.order_unsure:
+        errors, order = _by_shown_order(runs, trial, other, order, twins)
+    else:
+        errors = _errors(trial.result, other, order, twins)
     start = _start(runs, trial.method, trial.result, trial.twins[0]) if trial.twins else ()
     errors = with_start(errors, trial.result, *start) if start else errors
     errors = without_faded(errors, trial.result, other, runs)
     return replace(trial, twins=twins, errors=errors, **_moments(trial.result, errors, other, order, twins))
 
 
-def _felt(
+def _by_shown_order(
     runs: Runs, trial: Trial, other: Beside, order: float, twins: Sequence[Beside]
 ) -> tuple[dict[str, StepError], float]:
-    """Errors, and the order that is shown by a third run, where Python functions of the state act."""
+    """Errors, and the order that is shown by a third run, where the method may lose its own."""
     farther = _farther(runs, trial.method, trial.count)
     shown = min(order, order_shown(trial.result, other, farther, order))
     errors = _errors(trial.result, other, shown, twins)

@@ -58,6 +58,13 @@ class Runs:
         return any(callback.with_state for callback in self.assembled.system.user.callbacks)
 
     @cached_property
+    def order_unsure(self) -> bool:
+        """Whether steps may lose the order of the method: with Python functions of the state; and where bodies that bend meet
+        damped stops, which hold them back faster than steps are, while they push, and not at all where they would pull."""
+        damped = any(kink.c or kink.d for force in forces_of(self.scene) for kink in force.kinks)
+        return self.feels or (damped and any(body.model.n for body in self.scene.bodies))
+
+    @cached_property
     def untold(self) -> dict[str, list[float]]:
         """When [s] functions of time break without steps that end there, by what they are for."""
         count = round((self.how["end"] - self.start) / self.output_step)
