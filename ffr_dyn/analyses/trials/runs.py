@@ -59,10 +59,11 @@ class Runs:
 
     @cached_property
     def order_unsure(self) -> bool:
-        """Whether steps may lose the order of the method: with Python functions of the state; and where bodies that bend meet
-        damped stops, which hold them back faster than steps are, while they push, and not at all where they would pull."""
-        damped = any(kink.c or kink.d for force in forces_of(self.scene) for kink in force.kinks)
-        return self.feels or (damped and any(body.model.n for body in self.scene.bodies))
+        """Whether steps may lose the order of the method: with Python functions of the state; and where what damps bodies
+        that bend holds light ends back faster than steps are, and soon after does not, as damped stops, dry friction and
+        curves do."""
+        uneven = any(force.damps_unevenly for force in forces_of(self.scene))
+        return self.feels or (uneven and any(body.model.n for body in self.scene.bodies))
 
     @cached_property
     def untold(self) -> dict[str, list[float]]:
@@ -74,7 +75,7 @@ class Runs:
     @cached_property
     def sudden(self) -> bool:
         """Whether forces may change within a step, however short: a run has an order beside about twice the step at most."""
-        return bool(self.untold) or self.feels or any(force.sudden for force in forces_of(self.scene))
+        return bool(self.untold) or self.order_unsure or any(force.sudden for force in forces_of(self.scene))
 
     def run(self, method: Integrator, **more: Any) -> Result:
         """One run."""

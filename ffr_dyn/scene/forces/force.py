@@ -108,6 +108,12 @@ class Force(ABC):
         return ()
 
     @property
+    def damps_unevenly(self) -> bool:
+        """Whether it may hold a light end back faster than a step is, and a moment later not, so that steps over that lose
+        the order of their method. Limited servos lose it by little."""
+        return False
+
+    @property
     def stiff_coordinates(self) -> tuple[int, ...]:
         """Numbers of the place's coordinates along which implicit methods take it so; none: it is explicit everywhere."""
         return ()

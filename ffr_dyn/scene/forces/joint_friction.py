@@ -81,6 +81,10 @@ class JointFriction(Force):
         return max(now.value(self.normal)[0], 0.0) * size  # below zero it is lifted off
 
     @property
+    def damps_unevenly(self) -> bool:
+        return True
+
+    @property
     def stiff_coordinates(self) -> tuple[int, ...]:
         return (0,)
 

@@ -65,6 +65,10 @@ class JointSpring(Force):
         return spring_kinks(self.stiffness, self.free)
 
     @property
+    def damps_unevenly(self) -> bool:
+        return isinstance(self.damping, Curve)
+
+    @property
     def stiff_coordinates(self) -> tuple[int, ...]:
         return stiff(self.stiffness, self.damping)
 

@@ -117,6 +117,10 @@ class JointStop(Force):
         return Kink(self.stiffness * self.entry**2 / (4 * self.damping), 0.0, 1.5 * out * self.entry + end, -1.0)
 
     @property
+    def damps_unevenly(self) -> bool:
+        return self.damping > 0
+
+    @property
     def stiff_coordinates(self) -> tuple[int, ...]:
         return (0,)
 

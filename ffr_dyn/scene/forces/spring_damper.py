@@ -70,6 +70,10 @@ class SpringDamper(Force):
         return spring_kinks(self.stiffness, self.free_length)
 
     @property
+    def damps_unevenly(self) -> bool:
+        return isinstance(self.damping, Curve)
+
+    @property
     def stiff_coordinates(self) -> tuple[int, ...]:
         return stiff(self.stiffness, self.damping)
 
