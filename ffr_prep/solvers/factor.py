@@ -43,7 +43,10 @@ _SCALING_SWEEPS = 10
 _BLOCK = 4  # vectors of a block in a search: the fewer, the fewer are needed in all
 _WIDE, _MANY = 8, 100  # and of one for more modes than these, where passes over all vectors take most of the time
 _VECTORS, _BLOCKS = 3, 12  # that a search has for each mode, about, and beside these
-_REMEDY = "look for parts joined by a single node or edge, or materials of extremely different stiffness"
+_REMEDY = (
+    "look for parts joined by a single node or edge, materials of extremely different stiffness, or a sheet so thin that it "
+    "wants plates (`ffr-prep reduce-structure`)"
+)
 
 
 # ---- the choice of a solver ---------------------------------------------------------------------------------------
