@@ -197,13 +197,13 @@ def _counts(span: float, output_step: float, step: float) -> tuple[int, int]:
     if substeps < 1 or abs(substeps * step - output_step) > 1e-9 * output_step:
         better = output_step / max(1, round(output_step / step))
         raise InputError(
-            f"the output step {output_step} s is not a multiple of the step {step} s; try a step of {better:.6g}"
+            f"the output step {output_step} s is not a multiple of the step {step} s; try a step of {better:.12g}"
         )
     if rows < 1 or abs(rows * output_step - span) > 1e-9 * span:
         whole = max(1, rows)
         raise InputError(
             f"the duration {span:.6g} s is not a multiple of the output step {output_step:.6g} s; try an output step of "
-            f"{span / whole:.6g}, or let it last {whole * output_step:.6g} s"
+            f"{span / whole:.12g}, or let it last {whole * output_step:.12g} s"
         )
     if rows > _MOST_ROWS:
         raise InputError(

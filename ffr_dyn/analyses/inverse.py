@@ -22,7 +22,7 @@ from ffr_dyn.consistency.assemble import Assembled, assemble, flattened
 from ffr_dyn.consistency.doubts import checked
 from ffr_dyn.consistency.evaluation import Evaluator, copied, evaluate, evaluator, joined, locked
 from ffr_dyn.consistency.mobility import require_driven, undeformed
-from ffr_dyn.equations.layout import moved, to_global_axes
+from ffr_dyn.equations.layout import moved, to_global_axes, velocity_sizes
 from ffr_dyn.integrators import Integrator, Within
 from ffr_dyn.integrators.stabilisation import Projection, Stabilisation
 from ffr_dyn.kernels.tables import AT, EVALUATIONS, HERE
@@ -34,7 +34,8 @@ from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError, InputError
 
 ITERATIONS = 30
-TOLERANCE = 1e-12  # of a change of q, relative to its size or to that which strains the body by 1e-6 of its length
+TOLERANCE = 1e-12  # of a change of q, relative to its size or to one that strains the body by STRAINED
+STRAINED, BENT = 1e-6, 1e-2  # q over size and root of mass of a body: the least by which changes and differences go
 ROUNDING = 1e-10  # relative as well, of a change that another one follows: what is left is rounding
 DIFFERENCE = 1e-6
 
@@ -208,15 +209,15 @@ def _deformed(
     """Deformation with vanishing elastic accelerations, and the tangent that found it, to be tried again at the next time."""
     if q.size == 0:
         return q, np.zeros((0, 0))
-    before = np.inf
+    before, sizes = np.inf, velocity_sizes(at.system.scene, at.system.layout)[places[1]]
     for _ in range(ITERATIONS):
         residual = _pose(at, places, time, x, q)
         if tangent is None:
-            tangent = _tangent(at, places, time, x, q)
+            tangent = _tangent(at, places, time, x, q, sizes)
         step = np.linalg.solve(tangent, residual)
         q = q - step
-        size = float(np.abs(step).max())
-        scale = max(float(np.abs(q).max()), 1e-6)
+        size = float(np.abs(step / sizes).max())
+        scale = max(float(np.abs(q / sizes).max()), STRAINED)
         if size < TOLERANCE * scale or before < ROUNDING * scale:
             return q, tangent
         if size > 0.1 * before:
@@ -228,8 +229,8 @@ def _deformed(
     )
 
 
-def _tangent(at: Evaluator, places: tuple[Array, Array], time: float, x: Array, q: Array) -> Array:
-    """(E, E) central differences of the elastic accelerations."""
-    h = DIFFERENCE * max(float(np.abs(q).max()), 1e-2)
-    sides = [[_pose(at, places, time, x, q + sign * h * one) for sign in (1, -1)] for one in np.eye(q.size)]
-    return np.array([(plus - minus) / (2 * h) for plus, minus in sides]).T
+def _tangent(at: Evaluator, places: tuple[Array, Array], time: float, x: Array, q: Array, sizes: Array) -> Array:
+    """(E, E) central differences of the elastic accelerations, by shares of the sizes (E,) of bodies."""
+    steps = DIFFERENCE * max(float(np.abs(q / sizes).max()), BENT) * sizes
+    sides = [[_pose(at, places, time, x, q + sign * one) for sign in (1, -1)] for one in np.diag(steps)]
+    return np.array([(plus - minus) / (2 * h) for h, (plus, minus) in zip(steps, sides, strict=True)]).T

@@ -25,10 +25,20 @@ from ffr_dyn.compile.divided_steps import fast_of
 from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.consistency import doubts
 from ffr_dyn.consistency.assemble import Assembled, assemble
-from ffr_dyn.consistency.evaluation import Evaluation, Evaluator, copied, evaluate, evaluator, joined, total_mass_matrix
+from ffr_dyn.consistency.evaluation import (
+    Evaluation,
+    Evaluator,
+    copied,
+    evaluate,
+    evaluated_mass_matrix,
+    evaluator,
+    joined,
+    smallest_step,
+    total_mass_matrix,
+)
 from ffr_dyn.consistency.mobility import named_motion, require_driven, undeformed
 from ffr_dyn.equations.constraint_rows import blocks_of, rows_at
-from ffr_dyn.equations.layout import moved, to_body_axes, to_global_axes
+from ffr_dyn.equations.layout import meets, moved, to_body_axes, to_global_axes
 from ffr_dyn.kernels.tables import EVALUATIONS, Record
 from ffr_dyn.results.quantities import selected
 from ffr_dyn.results.result import Result
@@ -182,12 +192,12 @@ def _advanced(at: Evaluator, pose: _Pose, time: float) -> _Pose | None:
     x = moved(place, pose.x, step)
     for _ in range(ITERATIONS):
         now = evaluate(at, time, x, np.zeros(place.v_size))
-        if np.abs(now.Phi).max(initial=0.0) < TOLERANCE:
-            return _pose(at, time, x, pose.v)
-        step = np.linalg.lstsq(now.jacobian, -now.Phi, rcond=1e-12)[0]
+        step = smallest_step(now.jacobian, evaluated_mass_matrix(at), -now.Phi)
         if _turn(at, step) > LARGEST_TURN:
             return None
         x = moved(place, x, step)
+        if meets(at.system.scene, x, now.Phi, TOLERANCE):  # and by the last step to rounding
+            return _pose(at, time, x, pose.v)
     return None
 
 
@@ -200,7 +210,7 @@ def _pose(at: Evaluator, time: float, x: Array, v: Array) -> _Pose:
     """The pose with its velocities (body axes), nearest to v, those before it: the rate of the rows at rest is Phi_t."""
     still = evaluate(at, time, x, np.zeros_like(v))
     values, sign, motion = _conditioning(at, still, x)
-    v = v + np.linalg.lstsq(still.jacobian, -still.nu - still.jacobian @ v, rcond=SINGULAR)[0]
+    v = v + smallest_step(still.jacobian, evaluated_mass_matrix(at), -still.nu - still.jacobian @ v, SINGULAR)
     return _Pose(time, x, v, values, sign, motion)
 
 

@@ -93,7 +93,7 @@ def _lowest_stiffness(at: Evaluator, assembled: Assembled, found: Equilibrium, t
         return float("inf"), 0.0
     K = Z.T @ found.balance.stiffness @ Z
     values, vectors = np.linalg.eigh(0.5 * (K + K.T))
-    if not found.found and values[0] > 0:
+    if not found.found and values[0] > ROUNDING * np.abs(values).max():
         motion = named_motion(at.system.scene, at.system.layout, x, Z @ np.linalg.solve(K, Z.T @ found.balance.forces))
         raise ComputationError(
             f"no equilibrium was found in {len(found.steps)} steps, though what moves is held: the start is too far from "

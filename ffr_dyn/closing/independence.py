@@ -19,7 +19,7 @@ from ffr_dyn.closing.positions import TOLERANCE, close_positions, largest_turn, 
 from ffr_dyn.closing.row_space import Dependence, Matrix, dependence, smallest_solution
 from ffr_dyn.compile.row_tables import moving_bodies
 from ffr_dyn.equations.constraint_rows import Block
-from ffr_dyn.equations.layout import Layout, moved, to_body_axes, to_global_axes
+from ffr_dyn.equations.layout import Layout, meets, moved, to_body_axes, to_global_axes
 from ffr_dyn.scene.scene import Scene, markers
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.brief import Brief
@@ -172,7 +172,7 @@ def _along(constraints: Constraints, x: Array, v: Array, way: Array, away: float
     found = moved(place, x, way)
     for _ in range(ITERATIONS):
         Phi, W, J = _rigid(constraints, found, v)
-        if np.abs(Phi).max(initial=0.0) < TOLERANCE:
+        if meets(scene, found, Phi, TOLERANCE):
             return close_positions(constraints, found, v)
         A = _with_row(J, way / np.linalg.norm(way)) @ W
         step = W @ smallest_solution(A, np.append(-Phi, 0.0))

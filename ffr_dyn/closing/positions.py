@@ -11,7 +11,7 @@ from scipy.sparse import block_diag, coo_array, csr_array
 from ffr_dyn.closing.constraints import Constraints, RowsAt, open_at, rows_at
 from ffr_dyn.closing.row_space import Matrix, smallest_solution
 from ffr_dyn.equations.inertia import kept_integrals, mass_matrix
-from ffr_dyn.equations.layout import Layout, moved, to_global_axes
+from ffr_dyn.equations.layout import Layout, meets, moved, to_global_axes
 from ffr_dyn.scene.joints import DISTANCE
 from ffr_dyn.scene.scene import Body, Scene
 from ffr_prep.body import remembered
@@ -29,20 +29,18 @@ def close_positions(constraints: Constraints, x: Array, v: Array) -> Array:
     Raises InputError for rows that stay open.
     """
     place = constraints.place
-    if np.abs(open_at(constraints, x, v)[0]).max(initial=0.0) < TOLERANCE:
+    if meets(constraints.scene, x, open_at(constraints, x, v)[0], TOLERANCE):
         return x
     start = x
     for elastic in (False, True):
         found, nearest = start, np.inf
         for _ in range(ITERATIONS):
             rows = rows_at(constraints, found, v)
-            left = np.abs(rows.Phi).max(initial=0.0)
+            left, met = np.abs(rows.Phi).max(initial=0.0), meets(constraints.scene, found, rows.Phi, TOLERANCE)
             if not elastic and left < nearest:  # from where bodies deform, if they must, by as little as they can
                 start, nearest = found, left
             found = moved(place, found, _limited(place, _step(constraints, found, rows, -rows.Phi, elastic)))
-            if (
-                left < TOLERANCE
-            ):  # and now to rounding, which tells rows that depend on others from those that nearly do
+            if met:  # and now to rounding, which tells rows that depend on others from those that nearly do
                 return found
     raise _open(constraints, rows)
 

@@ -17,7 +17,7 @@ from scipy.sparse import csr_array, lil_array
 from ffr_dyn.closing.constraints import Constraints, constraints_of, rows_at
 from ffr_dyn.closing.row_space import Matrix, independent
 from ffr_dyn.equations.constraint_rows import Block, drive_at
-from ffr_dyn.equations.layout import Layout, initial_state, moved, to_global_axes
+from ffr_dyn.equations.layout import Layout, initial_state, moved, to_global_axes, velocity_sizes
 from ffr_dyn.functions.time_functions import POLYNOMIAL, TimeFunction
 from ffr_dyn.scene.joints import Word
 from ffr_dyn.scene.scene import Body, Scene, body_normal, used_interfaces
@@ -97,13 +97,13 @@ def _turned_about(place: Layout, heights: tuple[float, ...]) -> csr_array:
 def _looked_at(constraints: Constraints) -> Found:
     scene, place, rng = constraints.scene, constraints.place, np.random.default_rng(0)
     start, v = initial_state(scene, place)
-    active = np.zeros(place.v_size, bool)
+    active, sizes = np.zeros(place.v_size, bool), velocity_sizes(scene, place)
     for b, n in enumerate(place.n):
         active[[place.iv[b] + c for c in (*place.active(b), *range(6, 6 + n))]] = True
     inside, outside, left, jacobians = [], [], [], []
     turned = _turned_about(place, _heights(scene))
     for scale in (0.0, 1e-2, 1e-2):
-        step = np.where(active, scale * rng.normal(size=place.v_size), 0.0)
+        step = np.where(active, scale * sizes * rng.normal(size=place.v_size), 0.0)
         x, speeds = moved(place, start, step), v + to_global_axes(place, start, 100 * step)
         rows = rows_at(constraints, x, speeds)
         jacobians.append((rows.J @ turned)[:, ~active])

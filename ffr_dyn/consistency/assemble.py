@@ -25,6 +25,7 @@ from ffr_dyn.consistency.sliding import sliding_notes
 from ffr_dyn.consistency.validity import deflections
 from ffr_dyn.equations.constraint_rows import Block, blocks_of
 from ffr_dyn.equations.layout import Layout, initial_state
+from ffr_dyn.functions.overshoots import overshoots
 from ffr_dyn.scene.force_kinds import forces_of
 from ffr_dyn.scene.scene import Scene, altered, require_scene
 from ffr_dyn.scene.sensors import Measurement
@@ -37,6 +38,7 @@ from ffr_prep.common.errors import InputError
 
 _MOST_GRAVITY = 1000.0  # m/s^2; in mm/s^2 that of the Earth is 9810
 SHIFTED = 1e-6  # m, rad, from where it is told that assembly moved a body
+SLOWED = 1e-2  # of a velocity that a scene gives, from where it is told that a body has another
 RELAXATION = 1e-6  # of dependent rows, relative: rounding over it is what their reactions are uncertain by
 BRANCHES = (
     "the scene starts in a singular position, where its motion may branch: to choose, draw it a little way along the branch "
@@ -82,12 +84,12 @@ def assemble(scene: Scene, *, time: float = 0.0) -> Assembled:
     declared, flat = scene, flat_form(scene, time)
     scene, rows, place = flat.scene, flat.rows, flat.rows.place
     left_out = [note for b, body in enumerate(scene.bodies) for note in check_dropped(body, place.active(b))]
-    guess, v = initial_state(scene, place)
-    x = led_to_drivers(rows, guess, lambda driven, at: close_positions(driven, at, v))
+    guess, given = initial_state(scene, place)
+    x = led_to_drivers(rows, guess, lambda driven, at: close_positions(driven, at, given))
     _require_shape(scene, place, guess, x)
-    found = independent_blocks(rows, x, v)
+    found = independent_blocks(rows, x, given)
     kept, redundant = found.blocks, found.redundant
-    v = close_velocities(rows, x, v)
+    v = close_velocities(rows, x, given)
     if found.singular:
         v = going_on(rows, x, v)
     count = sum(len(block.words) for block in kept)
@@ -97,7 +99,7 @@ def assemble(scene: Scene, *, time: float = 0.0) -> Assembled:
     ] + left_out
     if found.singular:
         notes.insert(0, BRANCHES)
-    notes = shifted(scene, place, guess, x) + notes
+    notes = shifted(scene, place, guess, x) + _slowed(scene, place, given, v) + notes
     if scene.plane != "none":
         notes.append(
             f"the scene is planar (normal {scene.plane}): computed in the plane, with in-plane modes without their rounding "
@@ -110,6 +112,7 @@ def assemble(scene: Scene, *, time: float = 0.0) -> Assembled:
     all_rows = compile_scene(scene, list(rows.blocks), RELAXATION) if redundant else None
     free = _movable(place) - count
     system = compile_scene(scene, kept) if redundant else rows.engine.system
+    notes += _beyond_tables(system)
     return Assembled(system, all_rows, x, v, free, tuple(notes), tuple(redundant), flat.computed)
 
 
@@ -141,6 +144,13 @@ def _idle(scene: Scene) -> list[str]:
     return idle + [doubt for force in forces_of(scene) for doubt in force.doubts(scene)]
 
 
+def _beyond_tables(system: System) -> list[str]:
+    """Notes on tables whose splines go far beyond their rows."""
+    functions = system.model.functions
+    found = overshoots(functions.kind, functions.start, functions.data)
+    return [f"{system.purposes[number]}: {one.words}" for number, one in found.items()]
+
+
 def _uncounted(rows: Constraints, x: Array) -> list[str]:
     """A note where drivers tell whole turns, and forces on angles are to begin within half a turn."""
     turns = max((round(angle.value / TURN) for angle in driven_angles(rows, x)), key=abs, default=0)
@@ -167,6 +177,28 @@ def shifted(scene: Scene, place: Layout, guess: Array, x: Array) -> list[str]:
     ]
     more = f", the most of {count} bodies," if count > 1 else ""
     return [f"assembly {' and '.join(said)}{more} from where the scene puts it"] if said else []
+
+
+def _slowed(scene: Scene, place: Layout, given: Array, v: Array) -> list[str]:
+    """A note where a body does not begin with the velocity that the scene gives it, on the one that is farthest off."""
+    parts = [
+        (float(np.linalg.norm(v[where] - given[where]) / size), body.name, word, v[where], given[where])
+        for b, body in enumerate(scene.bodies)
+        for word, where in (("velocity {} m/s", place.R_dot(b)), ("omega_bar {} rad/s", place.omega(b)))
+        if (size := np.linalg.norm(given[where])) > 0
+    ]
+    off, name, word, now, before = max(parts, key=lambda part: part[0], default=(0.0, "", "", v, v))
+    if off <= SLOWED:
+        return []
+    return [
+        f"body {name!r} begins with {word.format(_in_words(now))}, not {_in_words(before)} as the scene says: joints and "
+        "drivers do not allow it beside the velocities of other bodies, zero where none is given; give those of all that move"
+    ]
+
+
+def _in_words(vector: Array) -> str:
+    rounding = np.abs(vector) <= 1e-9 * np.linalg.norm(vector)
+    return "(" + ", ".join(f"{number:.4g}" for number in np.where(rounding, 0.0, vector)) + ")"
 
 
 def turned(p: Array, p0: Array) -> float:

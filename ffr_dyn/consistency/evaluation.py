@@ -16,7 +16,7 @@ from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.compile.workspace import new_record
 from ffr_dyn.consistency.failure import failure
 from ffr_dyn.equations.inertia import kept_integrals, mass_matrix
-from ffr_dyn.equations.layout import Layout, initial_state, moved, to_body_axes, to_global_axes
+from ffr_dyn.equations.layout import Layout, initial_state, meets, moved, to_body_axes, to_global_axes
 from ffr_dyn.functions.rotation import skew
 from ffr_dyn.kernels.simd.table_address import pack
 from ffr_dyn.kernels.tables import IN_Q, IN_SHARED, OK, SINGULAR_CONSTRAINT, Record, Work
@@ -232,11 +232,17 @@ def free_motions(jacobian: Array, M: Array) -> Array:
     return np.linalg.solve(lower.T, basis[rank:].T)
 
 
-def smallest_step(jacobian: Array, M: Array, target: Array) -> Array:
-    """The step (V,) with jacobian step = target that is smallest in the norm of the mass matrix."""
+def smallest_step(jacobian: Array, M: Array, target: Array, tolerance: float = RANK_TOLERANCE) -> Array:
+    """The step (V,) with jacobian step = target that is smallest in the norm of the mass matrix.
+
+    tolerance : how small a combination of rows of length one is left out, over the largest
+    """
     lower = _weights(M)
     weighted = np.linalg.solve(lower, jacobian.T).T
-    return np.linalg.solve(lower.T, np.linalg.lstsq(weighted, target, rcond=RANK_TOLERANCE)[0])
+    length = np.linalg.norm(weighted, axis=1)
+    length = np.where(length > 0, length, 1.0)
+    unit = np.linalg.lstsq(weighted / length[:, None], target / length, rcond=tolerance)[0]
+    return np.linalg.solve(lower.T, unit)
 
 
 NO_INERTIA = 1e-9  # of the largest inertia, in place of none
@@ -257,7 +263,7 @@ def closed(at: Evaluator, time: float, x: Array, v: Array) -> tuple[Array, Array
     x = moved(place, x, np.zeros(place.v_size))
     for _ in range(CORRECTIONS):
         now = evaluate(at, time, x, v)
-        if np.abs(now.Phi).max(initial=0.0) < CLOSED:
+        if meets(at.system.scene, x, now.Phi, CLOSED):
             break
         x = moved(place, x, smallest_step(now.jacobian, evaluated_mass_matrix(at), -now.Phi))
     else:

@@ -13,6 +13,8 @@ from ffr_dyn.variants.plane import AXES
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.brief import Brief
 
+ROUNDING = 2e-15  # of a row of constraints, over the longest vector that it is a difference of
+
 
 @dataclass(frozen=True, repr=False)
 class Layout(Brief):
@@ -72,6 +74,22 @@ def initial_state(scene: Scene, place: Layout) -> tuple[Array, Array]:
         x[place.R(b)], x[place.p(b)], x[place.q(b)] = body.position, body.rotation, body.q
         v[place.R_dot(b)], v[place.omega(b)], v[place.q_dot(b)] = body.velocity, body.omega_bar, body.q_dot
     return x, v
+
+
+def velocity_sizes(scene: Scene, place: Layout) -> Array:
+    """(V,) velocities that move and bend each body by about its size, and turn it by a radian, in a second; bodies without a
+    size of their own are taken as large as the largest."""
+    sizes, largest = np.ones(place.v_size), max(body.model.size for body in scene.bodies) or 1.0
+    for b, body in enumerate(scene.bodies):
+        sizes[place.R_dot(b)] = size = body.model.size or largest
+        sizes[place.q_dot(b)] = size * np.sqrt(body.model.mass)
+    return sizes
+
+
+def meets(scene: Scene, x: Array, Phi: Array, tolerance: float) -> bool:
+    """Whether rows Phi (C,) [m, -] vanish to a tolerance, or to the rounding of positions (X,) and bodies that are large."""
+    reach = max(float(np.abs(x).max()), *(body.model.size for body in scene.bodies))
+    return float(np.abs(Phi).max(initial=0.0)) <= max(tolerance, ROUNDING * reach)
 
 
 def angular_speeds(place: Layout, v: Array) -> Array:

@@ -18,7 +18,7 @@ import numpy as np
 from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.consistency.assemble import Assembled, assemble, in_space
 from ffr_dyn.consistency.evaluation import evaluate, evaluator, free_motions, total_mass_matrix
-from ffr_dyn.equations.layout import to_global_axes
+from ffr_dyn.equations.layout import to_global_axes, velocity_sizes
 from ffr_dyn.results.quantities import catalogue
 from ffr_dyn.results.result import Result
 from ffr_dyn.scene.scene import Scene
@@ -54,11 +54,8 @@ def pushed(assembled: Assembled, time: float, lasts: float) -> Assembled:
     now = evaluate(evaluator(assembled.system), time, assembled.x, assembled.v)
     M = total_mass_matrix(scene, place, assembled.x)
     Z = free_motions(now.jacobian, M)
-    push, sizes = np.random.default_rng(0).normal(size=place.v_size), np.ones(place.v_size)
-    for b, body in enumerate(scene.bodies):
-        sizes[place.R_dot(b)] = body.model.size
-        sizes[place.q_dot(b)] = body.model.size * np.sqrt(body.model.mass)
-    faster = Z @ (Z.T @ (M @ (PUSH / lasts * sizes * push)))
+    push = np.random.default_rng(0).normal(size=place.v_size)
+    faster = Z @ (Z.T @ (M @ (PUSH / lasts * velocity_sizes(scene, place) * push)))
     return replace(assembled, v=assembled.v + to_global_axes(place, assembled.x, faster))
 
 

@@ -20,7 +20,7 @@ from ffr_dyn.compile.workspace import new_record
 from ffr_dyn.consistency.evaluation import Evaluator, evaluate, evaluator
 from ffr_dyn.consistency.failure import failure
 from ffr_dyn.consistency.tangent import STEP, Chart, chart, length_of, sizes_of
-from ffr_dyn.equations.layout import Layout, moved, to_body_axes, to_global_axes
+from ffr_dyn.equations.layout import Layout, meets, moved, to_body_axes, to_global_axes
 from ffr_dyn.functions.rotation import rotation_matrix
 from ffr_dyn.functions.time_functions import evaluate as value_of
 from ffr_dyn.functions.together import together
@@ -132,7 +132,7 @@ def placed(of: Turns, s: Array) -> tuple[Array, Array]:
     for _ in range(CORRECTIONS):
         x = moved(place, near.x, y)
         now = evaluate(near.at, near.time, x, to_global_axes(place, x, V))
-        if np.abs(now.Phi).max(initial=0.0) <= MET:
+        if meets(of.system.scene, x, now.Phi, MET):
             return x, to_global_axes(place, x, V + of.across @ _least(now.jacobian @ of.across, -now.nu))
         y = y + of.across @ _least(now.jacobian @ of.across, -now.Phi)
     raise ComputationError(

@@ -95,7 +95,7 @@ def in_frame(model: CoupledModel, L: Array, vectors: Array) -> Array:
     """
     if len(L) > 6:
         moving = np.hstack([vectors, model.T])
-        return moving @ _admissible(moving, L)
+        return moving @ _admissible(model, moving, L)
     for _ in range(2):  # the second pass removes the rounding of the first where rigid motion was most of a vector
         vectors = vectors - model.T @ np.linalg.solve(L @ model.T, L @ vectors)
     return vectors
@@ -129,16 +129,18 @@ def _norms(M: sp.csr_array, V: Array) -> Array:
     return np.sqrt(np.einsum("zi,zi->i", V, M @ V))
 
 
-def restricted(vectors: Array, K: Array, L: Array) -> tuple[Array, Array]:
+def restricted(model: CoupledModel, vectors: Array, K: Array, L: Array) -> tuple[Array, Array]:
     """The combinations of the vectors (Z, p), with stiffness K (p, p), that satisfy L u = 0: vectors and stiffness."""
-    V = _admissible(vectors, L)
+    V = _admissible(model, vectors, L)
     return vectors @ V, V.T @ K @ V
 
 
-def _admissible(vectors: Array, L: Array) -> Array:
-    """(p, k) the combinations of the vectors (Z, p) that satisfy L u = 0."""
-    scale = 1 / np.linalg.norm(vectors, axis=0)
-    return scale[:, None] * scipy.linalg.null_space(L @ (vectors * scale), rcond=1e-10)
+def _admissible(model: CoupledModel, vectors: Array, L: Array) -> Array:
+    """(p, k) the combinations of the vectors (Z, p) that satisfy L u = 0, told apart alike in any unit of length."""
+    scale = 1 / _norms(model.M, vectors)
+    conditions = L @ (vectors * scale)
+    sizes = np.linalg.norm(conditions, axis=1, keepdims=True)
+    return scale[:, None] * scipy.linalg.null_space(conditions / np.where(sizes > 0, sizes, 1.0), rcond=1e-10)
 
 
 def diagonalised(model: CoupledModel, vectors: Array, K: Array) -> Basis:

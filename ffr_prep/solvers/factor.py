@@ -43,7 +43,10 @@ _SCALING_SWEEPS = 10
 _BLOCK = 4  # vectors of a block in a search: the fewer, the fewer are needed in all
 _WIDE, _MANY = 8, 100  # and of one for more modes than these, where passes over all vectors take most of the time
 _VECTORS, _BLOCKS = 3, 12  # that a search has for each mode, about, and beside these
-_REMEDY = "look for parts joined by a single node or edge, or materials of extremely different stiffness"
+_REMEDY = (
+    "look for parts joined by a single node or edge, materials of extremely different stiffness, or a sheet so thin that it "
+    "wants plates (`ffr-prep reduce-structure`)"
+)
 
 
 # ---- the choice of a solver ---------------------------------------------------------------------------------------
@@ -289,7 +292,7 @@ def supported(body: FreeBody, C: sp.csr_array | Array) -> SupportedBody:
     flexibility = body.solve(C.T.toarray())
     held = C @ body.T
     bordered = np.block([[-C @ flexibility, held], [held.T, np.zeros((6, 6))]])
-    scale = _equilibration(bordered)
+    scale = _of_equal_size(bordered, C.shape[0])
     scaled = scale[:, None] * bordered * scale
     condition = np.linalg.cond(scaled)
     if not condition < 1e13:
@@ -335,6 +338,18 @@ def _check_residual(problem: SupportedBody, f: Array, u: Array, mu: Array) -> No
             f"a static solution misses equilibrium by {residual:.1e} N (allowed {allowed:.1e} N): the stiffness is "
             f"nearly singular; {_REMEDY}"
         )
+
+
+def _of_equal_size(bordered: Array, count: int) -> Array:
+    """(n,) factors that make the largest entries of its rows and those of the flexibility of its first `count` near one.
+
+    The flexibility of a long body is small beside its rigid motions in one unit and large in another. Factors of supports
+    may grow as those of rigid motions shrink, which leaves what these do at supports as it is.
+    """
+    d = _equilibration(bordered)
+    flexible = np.abs(d[:count, None] * bordered[:count, :count] * d[:count]).max()
+    share = np.sqrt(flexible) if flexible > 0 else 1.0
+    return np.concatenate([d[:count] / share, d[count:] * share])
 
 
 def _equilibration(A: Array) -> Array:

@@ -36,6 +36,10 @@ from ffr_prep.common.errors import ComputationError, InputError
 
 LEAP = {2: 16}  # times more in the next one at most, by order (others: 8): an earlier trial tells the error of the next
 FEW = 16  # steps in the time for which a stop is met, with fewer of which errors do not fall by the order yet
+UNTOLD = (
+    "the runs that would tell the error of the steps have failed, or have no two rows in common with this one; take a "
+    "smaller step"
+)
 SURE = 2  # order that linearly implicit methods keep where elastic forces are stiff
 
 
@@ -96,8 +100,9 @@ def _errors(result: Result, other: Beside | None, order: float, twins: Sequence[
 
 def with_its_errors(runs: Runs, trial: Trial, other: Any, *longer: Any) -> Trial:
     """The run with its errors, also by what `further_runs` returned."""
+    untold = (UNTOLD,) if trial.result.time.size > 1 else ()
     if has_failed(other):
-        return replace(trial, errors={})
+        return replace(trial, errors={}, doubts=untold)
     share, failed = twin_share(trial.method), any(isinstance(twin, ComputationError) for twin in longer)
     too_long = failed or (share is not None and not trial.twins)  # steps for an order, where twins fail
     order = 1 if too_long else PARTLY_STIFF if share == 0.5 else trial.method.order
@@ -113,6 +118,8 @@ def with_its_errors(runs: Runs, trial: Trial, other: Any, *longer: Any) -> Trial
     start = _start(runs, trial.method, trial.result, trial.twins[0]) if trial.twins else ()
     errors = with_start(errors, trial.result, *start) if start else errors
     errors = without_faded(errors, trial.result, other, runs)
+    if not errors:
+        return replace(trial, twins=twins, errors={}, doubts=untold)
     return replace(trial, twins=twins, errors=errors, **_moments(trial.result, errors, other, order, twins))
 
 
@@ -130,7 +137,7 @@ def _moments(
     result: Result, errors: Mapping[str, StepError], other: Beside, order: float, twins: Sequence[Beside]
 ) -> dict[str, Any]:
     """The events of a run with their errors, if it has looked for any, and doubts about them."""
-    if "events" not in result.attributes or not errors:
+    if "events" not in result.attributes:
         return {}
     events = with_errors(result, errors, other, order, twins)
     further = [one.result for one in (other, *twins)]

@@ -76,10 +76,7 @@ def _at_least(errors: Mapping[str, StepError]) -> str:
 def _unseen(trial: Trial) -> list[str]:
     """A note where what the steps damp, or what stops give back, is not in the errors."""
     if not trial.errors:
-        nothing = (
-            "the runs that would tell the error of the steps have failed, or have no two rows in common with this one"
-        )
-        return [f"{nothing}; take a smaller step"] if trial.result.time.size > 1 else []
+        return []
     if "rebounds" in trial.result.attributes:
         lost = trial.result.attributes["rebounds"]
         return [f"the error told leaves out rebounds from stops, for which the steps are too long: {lost}"]

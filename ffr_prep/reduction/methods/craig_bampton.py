@@ -62,6 +62,6 @@ def with_fixed_interfaces(
     def with_modes(omega2: Array, vectors: Array) -> Basis:
         shapes, stiffness = static()
         K = scipy.linalg.block_diag(np.diag(omega2), stiffness)
-        return diagonalised(model, *restricted(np.hstack([vectors, shapes]), K, L))
+        return diagonalised(model, *restricted(model, np.hstack([vectors, shapes]), K, L))
 
     return selected(model, body, fixed, modes, with_modes)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from itertools import pairwise
 
@@ -260,3 +261,19 @@ def test_an_error_that_no_run_tells_is_told_to_be_unknown(monkeypatch):
     result = forward(swinging(0.0), **SPAN, method=only, check=True)
     assert result.attributes["accuracy"] == "step: not known"
     assert any("runs that would tell the error of the steps have failed" in note for note in result.attributes["notes"])
+    unasked = forward(swinging(0.0), **SPAN, method=only, check=False)
+    assert unasked.attributes["accuracy"] == "step: not known"
+    assert not any("failed" in note for note in unasked.attributes["notes"])
+
+
+@pytest.mark.parametrize(
+    "span", [{"output_step": 0.1, "method": ROS2(7.8e-4)}, {"output_step": 0.03, "method": ROS2(1e-2)}]
+)
+def test_a_step_that_a_refusal_names_is_taken(span):
+    """It was rounded to six digits, and refused again by the same words."""
+    with pytest.raises(InputError) as refused:
+        forward(swinging(0.0), end=0.1, **span)
+    named = re.search(r"try a step of (?P<step>\S+)|try an output step of (?P<row>[^,]+)", str(refused.value))
+    row = float(named["row"] or span["output_step"])
+    result = forward(swinging(0.0), end=0.1, output_step=row, method=ROS2(float(named["step"] or row / 3)), check=False)
+    assert result.time[-1] == pytest.approx(0.1)

@@ -13,6 +13,7 @@ from ffr_dyn.consistency.assemble import assemble
 from ffr_dyn.consistency.mobility import mobility
 from ffr_dyn.functions.formula import formula
 from ffr_dyn.functions.rotation import euler_parameters, rotation_matrix
+from ffr_dyn.functions.time_functions import table
 from ffr_dyn.integrators import RK4
 from ffr_dyn.scene.drivers import Driver
 from ffr_dyn.scene.forces import Load
@@ -100,3 +101,33 @@ def test_a_fixed_joint_with_an_axis_brings_both_frames_together():
     assembled = assemble(welded(axis=(0, 0, 1)))
     for b in range(2):
         np.testing.assert_allclose(np.abs(assembled.x[assembled.system.layout.p(b)]), (1, 0, 0, 0), rtol=0, atol=1e-10)
+
+
+def test_a_velocity_that_joints_do_not_allow_is_told():
+    """It began with half of it, or with none, without a word."""
+    scene = tied("spherical")
+    thrown = replace(scene, bodies=(replace(scene.bodies[0], velocity=(2.0, 0, 0), omega_bar=(0, 0, 3.0)),))
+    (told,) = [note for note in assemble(thrown).notes if "as the scene says" in note]
+    assert told.startswith(
+        "body 'a' begins with velocity (0, 0, 0) m/s, not (2, 0, 0) as the scene says: joints and drivers"
+    )
+    turning = replace(scene, bodies=(replace(scene.bodies[0], omega_bar=(0, 0, 3.0)),))
+    assert not any("as the scene says" in note for note in assemble(turning).notes)
+
+
+def test_a_table_whose_spline_swings_far_beyond_its_rows_is_told():
+    """As of a cam that dwells and rises at corners; with more rows beside the corners it does not."""
+    corners = np.array([[0, 0.05, 0.051, 0.12, 0.121, 0.2], [0, 0, 0.002, 0.03, 0.03, 0]])
+    beside = np.unique(
+        np.concatenate([corners[0], *(corners[0] + by for by in (-1e-3, -5e-4, 5e-4, 1e-3))]).clip(0, 0.2)
+    )
+    told = []
+    for times in (corners[0], beside):
+        cam = Driver("cam", "tie", table(times, np.interp(times, *corners)))
+        notes = assemble(replace(tied("revolute"), drivers=(cam,))).notes
+        told.append([note for note in notes if "spline" in note])
+    assert told[1] == []
+    assert told[0] == [
+        "'cam': the cubic spline through its table goes to -0.05154 at t = 0.01978 s, where its rows hold 0 to 0.03; give "
+        "more rows beside its corners, or a piecewise function"
+    ]

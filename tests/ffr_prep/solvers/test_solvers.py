@@ -202,3 +202,10 @@ def test_the_command_line_refuses_bad_ranks(tmp_path, capsys):
         cli.main(["reduce", *BAR, "--solver", "slepc", "--ranks", "0", "-o", str(tmp_path / "bar.ffr")])
     assert left.value.code == 2
     assert "solver 'slepc' with 0 ranks cannot be run" in capsys.readouterr().err
+
+
+def test_a_sheet_too_thin_for_solids_is_told_to_want_plates():
+    """It is in one piece, of one material: of what was told to look for there was nothing."""
+    sheet = fp.from_mesh(box_mesh("hex20", (0.5, 0.03, 1e-5), (4, 1, 1)), STEEL, [InterfaceRegion("left")])
+    with pytest.raises(ComputationError, match=r"a sheet so thin that it wants plates \(`ffr-prep reduce-structure`\)"):
+        fp.reduce(sheet, fp.Request(name="sheet", reference=FixedTo("left"), reduction=Eigenmodes(2)))
