@@ -95,7 +95,7 @@ class ByEigsh:
         stiffness = model.K[inner:][:, inner:].toarray() + coupling.T @ shapes[:inner]
         vectors = np.hstack([np.vstack([modes, np.zeros((12, self.modes))]), shapes])
         small = scipy.linalg.block_diag(np.diag(omega2), (stiffness + stiffness.T) / 2)
-        return diagonalised(model, *restricted(vectors, small, L))
+        return diagonalised(model, *restricted(model, vectors, small, L))
 
 
 def run(mesh_file: Path, body_file: Path, solver: str, ranks: int, kind: str) -> None:
