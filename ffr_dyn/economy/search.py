@@ -43,6 +43,7 @@ from ffr_dyn.economy.selection import Insufficient, Selection, gap, selected_mod
 from ffr_dyn.economy.steps import Stepped, chosen_step
 from ffr_dyn.economy.verification import apart, reference_cost, sharpened, unheard, verified
 from ffr_dyn.integrators.stabilisation import Projection, Stabilisation
+from ffr_dyn.scene.force_kinds import forces_of
 from ffr_dyn.scene.scene import Scene
 from ffr_dyn.variants.mean_axis import in_new_frames
 from ffr_prep.common.arrays import Array
@@ -161,7 +162,7 @@ def _surely_rigid(ledger: Ledger, stiff: Rigid, omitted: Contributions) -> Chose
     """Rigid bodies, where the estimate of what they leave out is far below the tolerances; None where it is not, or where it
     cannot tell."""
     limits, model = stiff.limits, omitted.effect.sum(axis=0)
-    if _acts_between_rows(stiff.trial, ledger.span):
+    if _acts_between_rows(stiff.trial, ledger.span) or _may_be_deaf(stiff.trial):
         return None
     if limits is None or (model > ledger.policy.surely_rigid * limits).any():
         return None
@@ -187,6 +188,13 @@ def _acts_between_rows(trial: Trial, span: Span) -> bool:
     steps = trial.choice.integrator(span.output_step)
     fast = fast_within(trial.made.assembled.system, steps, span.start, span.end, span.output_step)
     return "meeting" in trial.result.attributes or (fast is not None and len(fast.spans) > 0)
+
+
+def _may_be_deaf(trial: Trial) -> bool:
+    """Whether a force has states in which the motion does not change it, as a servo at its limit: what an estimate finds
+    there says nothing of other states. Of functions of the state nobody knows."""
+    functions = trial.made.assembled.system.user.callbacks
+    return any(one.with_state for one in functions) or any(force.deaf for force in forces_of(trial.scene))
 
 
 def _with_step(ledger: Ledger, choice: Choice, model: Array, limits: Array) -> Stepped:
@@ -354,7 +362,7 @@ def _finished(ledger: Ledger, found: Chosen, verify: bool | None) -> Economy:
         search_cost=ledger.spent - verifying,
         tried=tuple(ledger.tried),
         runs=_all_runs(ledger, found, verification),
-        unmoved=unmoved(found.omitted, found.scales, names, ledger.policy),
+        unmoved=() if _may_be_deaf(final) else unmoved(found.omitted, found.scales, names, ledger.policy),
         frequencies=frequencies(final, ledger.made(found.everything), found.everything, ledger.scene, ledger.policy),
         stiffening=stiffening_loads(final, ledger.policy),
         notes=(*_notes(ledger, final), *stress_doubts(final, ledger.scene, ledger.of, found.limits)),
