@@ -19,15 +19,16 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from ffr_dyn.analyses.events import Event
-from ffr_dyn.analyses.forward import Forward, forward
+from ffr_dyn.analyses.forward import Forward, end_by_events
 from ffr_dyn.analyses.integration import fast_within
 from ffr_dyn.analyses.settings import Settings
 from ffr_dyn.analyses.trials.begin import Beginning
-from ffr_dyn.consistency.assemble import Assembled, assemble, body_doubts
+from ffr_dyn.consistency.assemble import assemble, body_doubts
 from ffr_dyn.economy.cache import Ledger, Tried
 from ffr_dyn.economy.checks import frequencies, stiffening_loads, stress_doubts
 from ffr_dyn.economy.contributions import Contributions, nothing, of_motion, of_omitted, own
@@ -47,7 +48,7 @@ from ffr_dyn.scene.force_kinds import forces_of
 from ffr_dyn.scene.scene import Scene
 from ffr_dyn.variants.mean_axis import in_new_frames
 from ffr_prep.common.arrays import Array
-from ffr_prep.common.errors import ComputationError, InputError
+from ffr_prep.common.errors import ComputationError
 
 Histories = tuple[Array, ...]
 
@@ -109,8 +110,13 @@ def economise(
     span, (scene, moved) = Span(start, end, output_step, stabilisation, begin), in_new_frames(scene)
     tell("assemble")
     assembled = assemble(scene, time=start)
-    if any(event.stop for event in events):
-        span = _ended(scene, assembled, span, events)
+    common: dict[str, Any] = {
+        "start": start,
+        "output_step": output_step,
+        "stabilisation": stabilisation,
+        "begin": begin,
+    }
+    span = replace(span, end=end_by_events(scene, events, end=end, assembled=assembled, **common))
     of = probe(assembled, [as_output(one, tolerance) for one in outputs], policy)
     check_meaning(of, scene, moved)
     ledger = Ledger(scene, span, of, tell, policy)
@@ -133,26 +139,6 @@ def _new_frames(found: Economy, moved: Sequence[str]) -> list[str]:
         f"in this model the frame of {flexible} is that of its mean motion, from which its position, rotation, elastic "
         "coordinates and displacements are seen, and what is measured in its axes"
     ]
-
-
-def _ended(scene: Scene, assembled: Assembled, span: Span, events: Sequence[Event]) -> Span:
-    """The span up to the last row before the event that ends the run."""
-    result = forward(
-        scene,
-        start=span.start,
-        end=span.end,
-        output_step=span.output_step,
-        stabilisation=span.stabilisation,
-        events=events,
-        begin=span.begin,
-        assembled=assembled,
-    )
-    rows = int((result.time[-1] - span.start) / span.output_step * (1.0 + 1e-12))
-    if rows < 2:
-        raise InputError(
-            f"an event ends the run at {result.time[-1]:g} s, within two output rows; take a shorter output_step"
-        )
-    return replace(span, end=span.start + rows * span.output_step)
 
 
 # ---- rigid bodies -----------------------------------------------------------------------------------------------------
