@@ -150,7 +150,7 @@ def _with_errors(runs: Runs, method: Integrator | Within, kept: dict[str, Any], 
     if isinstance(method, Within):
         return searched(runs, method, kept)
     count = 0 if method.controlled else round(runs.output_step / method.step)
-    told = checked(runs, method, count, kept) if check else Trial(method, count, runs.run(method, **kept))
+    told = checked(runs, method, count, kept) if check else Trial(method, count, runs.run(method, **kept), alone=True)
     if check is None and cost_of_errors(runs.assembled, told.result) < QUICK:
         told = checked(runs, method, count, kept, told.result)
     return finished(runs, told, kept["resume"] if kept["path"] is None else kept["path"])

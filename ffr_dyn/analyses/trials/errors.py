@@ -45,7 +45,8 @@ def leap_of(method: Integrator) -> int:
 
 @dataclass(frozen=True)
 class Trial:
-    """A run and what tells its error; no errors where the runs that would tell them failed."""
+    """A run and what tells its error; no errors where the runs that would tell them failed, or it is `alone`: none was asked
+    for."""
 
     method: Integrator
     count: int  # steps to an output row
@@ -54,6 +55,7 @@ class Trial:
     errors: Mapping[str, StepError] = field(default_factory=dict)
     events: Sequence[Mapping[str, Any]] = ()  # with their errors, and notes on them
     doubts: Sequence[str] = ()
+    alone: bool = False
 
 
 def checked(runs: Runs, method: Integrator, count: int, kept: Mapping[str, Any], result: Result | None = None) -> Trial:

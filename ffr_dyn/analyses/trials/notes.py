@@ -59,7 +59,7 @@ def finished(runs: Runs, trial: Trial, path: str | Path | None, ringing: Set[str
     if trial.errors:
         more["accuracy"] = _at_least(trial.errors) if unseen else worst(trial.errors)
         more["effort"] = sum(runs.work) / max(1, result.attributes["evaluations"])
-    elif result.time.size > 1:
+    elif unseen:
         more["accuracy"] = "step: not known"
     attributes = {**result.attributes, **more}
     if path is not None:
@@ -79,7 +79,7 @@ def _unseen(trial: Trial) -> list[str]:
         nothing = (
             "the runs that would tell the error of the steps have failed, or have no two rows in common with this one"
         )
-        return [f"{nothing}; take a smaller step"] if trial.result.time.size > 1 else []
+        return [] if trial.alone or trial.result.time.size < 2 else [f"{nothing}; take a smaller step"]
     if "rebounds" in trial.result.attributes:
         lost = trial.result.attributes["rebounds"]
         return [f"the error told leaves out rebounds from stops, for which the steps are too long: {lost}"]

@@ -259,4 +259,8 @@ def test_an_error_that_no_run_tells_is_told_to_be_unknown(monkeypatch):
     monkeypatch.setattr(Runs, "run", failing)
     result = forward(swinging(0.0), **SPAN, method=only, check=True)
     assert result.attributes["accuracy"] == "step: not known"
-    assert any("runs that would tell the error of the steps have failed" in note for note in result.attributes["notes"])
+    failed = "runs that would tell the error of the steps have failed"
+    assert any(failed in note for note in result.attributes["notes"])
+    alone = forward(swinging(0.0), **SPAN, method=only, check=False)  # nothing has failed where nothing was asked for
+    assert "accuracy" not in alone.attributes
+    assert not any(failed in note for note in alone.attributes["notes"])
