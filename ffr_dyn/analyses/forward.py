@@ -29,6 +29,7 @@ from ffr_dyn.integrators.stabilisation import Projection, Stabilisation
 from ffr_dyn.results.result import Result
 from ffr_dyn.scene.checks import several
 from ffr_dyn.scene.scene import Scene
+from ffr_prep.common.errors import InputError
 
 # Of the accuracy [m, -], that constraints are closed to: 1e-9 m moved forces by up to 1e-3 of their range.
 PROJECTED = 1e-8
@@ -127,6 +128,21 @@ def forward(
     runs, kept = Runs(scene, assembled, start, output_step, common, begin), {"path": path, "resume": resume}
     with runs.saying_what_is_kept():
         return _with_errors(runs, wanted, kept, check)
+
+
+def end_by_events(scene: Scene, events: Sequence[Event], *, end: float, output_step: float, **how: Any) -> float:
+    """Time [s] of the last row that a run has before an event ends it, up to which runs can be compared; `end` where none
+    ends it. how : as of `forward`.
+
+    Raises InputError where that leaves fewer than two output steps.
+    """
+    if not any(event.stop for event in events):
+        return end
+    last, start = forward(scene, events=events, end=end, output_step=output_step, **how).time[-1], how.get("start", 0.0)
+    rows = int((last - start) / output_step * (1.0 + 1e-12))
+    if rows < 2:
+        raise InputError(f"an event ends the run at {last:g} s, within two output rows; take a shorter output_step")
+    return float(start + rows * output_step)
 
 
 def _with_errors(runs: Runs, method: Integrator | Within, kept: dict[str, Any], check: bool | None) -> Result:

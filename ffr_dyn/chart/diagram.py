@@ -6,6 +6,8 @@ import statistics
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
+from ffr_dyn.analyses.events import Event
+from ffr_dyn.analyses.forward import end_by_events
 from ffr_dyn.chart.meaning import check_meaning
 from ffr_dyn.chart.measures import Measure, default_measures, measure_of
 from ffr_dyn.chart.pareto import pareto_front
@@ -130,6 +132,7 @@ def work_precision(
     methods: Mapping[str, Sequence[float] | None] | None = None,
     models: Sequence[Model] = (FULL,),
     stabilisation: Stabilisation = Projection(),  # noqa: B008 - frozen
+    events: Sequence[Event] = (),
     repeats: int = REPEATS,
     limit: float = 60.0,
     wanted: float = WANTED,
@@ -140,6 +143,7 @@ def work_precision(
 
     methods  : steps [s] or tolerances by method, None for a ladder that is chosen; default all methods
     models   : what is simplified; the reference has the full one
+    events   : of the scene's runs; where one ends them, they are compared up to the last row before
     limit    : wall time [s] that a run may take
     wanted   : relative error [1] that the reference should have, see `reference`
     tell     : told how the reference is found;  progress : told how many variants are done, of how many
@@ -150,6 +154,7 @@ def work_precision(
     """
     measures = measures or measures_of(scene, (), span.start)
     check_meaning(scene, measures, models)
+    span = _ended(scene, span, stabilisation, events, tell)
     variants = grid(scene, models, dict.fromkeys(known_methods()) if methods is None else methods, span.output_step)
     found = reference(scene, span, measures, stabilisation, pool, limit=limit, wanted=wanted, tell=tell)
     jobs = [Job(scene, variant, span, measures, stabilisation, repeats, limit) for variant in variants]
@@ -161,6 +166,15 @@ def work_precision(
         if isinstance(o, Failure)
     ]
     return Diagram(scene.name, measures, tuple(points), tuple(lost), found)
+
+
+def _ended(
+    scene: Scene, span: Span, stabilisation: Stabilisation, events: Sequence[Event], tell: Callable[[str], None]
+) -> Span:
+    end = end_by_events(scene, events, **span.integrated, begin=span.begin, stabilisation=stabilisation)
+    if end < span.end:
+        tell(f"an event ends the run: compared are the rows up to {end:.6g} s")
+    return replace(span, end=end)
 
 
 def run_variants(

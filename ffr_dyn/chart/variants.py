@@ -97,11 +97,15 @@ def models_of(
     own = {body.name: body.model.n for body in scene.bodies}
     found: list[Model] = []
     for picked in product(*meshes):
-        most = max((own | {body: model.n for body, _, model in picked}).values())
+        most = max((own | {body: _most(model) for body, _, model in picked}).values())
         counts = [number if number is None or number < most else most for number in numbers]
         different = dict.fromkeys(None if None in counts and number == most else number for number in counts)
         found += [_model(number, terms, picked) for number in different for terms in dict.fromkeys(chosen)]
     return tuple(found)
+
+
+def _most(model: FlexibleBody) -> int:
+    return max(part.n for part in model.parts or (model,))
 
 
 def _model(modes: int | None, drop: tuple[str, ...], meshes: Sequence[tuple[str, str, FlexibleBody]]) -> Model:

@@ -120,8 +120,8 @@ def chart(
     with pool(workers, cluster) as where, counted(loaded.name) as update:
         found = work_precision(
             loaded, span, where, measures=chosen, methods=compared, models=models, stabilisation=settings.stabilisation,
-            repeats=repeats, limit=limit, wanted=wanted, tell=lambda line: click.echo(f"reference    {line}"),
-            progress=update,
+            events=settings.analysis.events, repeats=repeats, limit=limit, wanted=wanted,
+            tell=lambda line: click.echo(f"reference    {line}"), progress=update,
         )  # fmt: skip
     for line in _report(found, against):
         click.echo(line)

@@ -170,24 +170,32 @@ def effects_of(
     scene: Scene, of: Probe, seen: Samples, Z: Array, q: Array, q_dot: Array, limit: Array, policy: Policy
 ) -> tuple[Array, int]:
     """(c, outputs) largest change of an output by the motion Z (T, V, c) with amplitudes and rates (T, c), and the number of
-    evaluations; all directions are looked at where they are largest, and at more states those that matter there."""
-    effect, plain = np.zeros((Z.shape[2], len(of.outputs))), _outputs(seen, seen.record, scene, of)
+    evaluations. All directions are looked at where they are largest, and at more states those that matter there. A limited
+    servo or a stop may be deaf to them in these states; so all are looked at, too, where together they do more."""
+    plain = _outputs(seen, seen.record, scene, of)
     order = np.argsort(-np.abs(q), axis=0, kind="stable")[: policy.looks_at_effect]
-    pairs = [(int(order[0, c]), c) for c in range(Z.shape[2]) if order.size]
-    count = 0
-    for _ in range(2):
-        if not pairs:
-            break
-        rows, columns = np.array(pairs).T
-        shift, rates = (Z[rows, :, columns] * values[rows, columns][:, None] for values in (q, q_dot))
+    effect, columns = np.zeros((Z.shape[2], len(of.outputs))), np.arange(Z.shape[2])
+
+    def changes(rows: Array, shift: Array, rates: Array) -> Array:
         values = _outputs(seen, _changed(seen, rows, shift, rates), scene, of)
-        changes = _change(of, values, tuple(one[rows] for one in plain))
-        sizes = np.array([np.abs(one).max(axis=1, initial=0.0) for one in changes]).T
-        np.maximum.at(effect, columns, sizes)
-        count += len(pairs)
-        more = np.flatnonzero((effect > policy.minor_effect * limit).any(axis=1))
-        pairs = [(int(row), int(c)) for c in more for row in order[1:, c]]
-    return effect, count
+        sizes = _change(of, values, tuple(one[rows] for one in plain))
+        return np.array([np.abs(one).max(axis=1, initial=0.0) for one in sizes]).T
+
+    def look(rows: Array, of_columns: Array) -> int:
+        if rows.size:
+            moves = (Z[rows, :, of_columns] * values[rows, of_columns][:, None] for values in (q, q_dot))
+            np.maximum.at(effect, of_columns, changes(rows, *moves))
+        return rows.size
+
+    if not order.size:
+        return effect, 0
+    count = look(order[0], columns)
+    more = np.flatnonzero((effect > policy.minor_effect * limit).any(axis=1))
+    count += look(order[1:, more].T.ravel(), np.repeat(more, len(order) - 1))
+    together = changes(np.arange(len(q)), *(np.einsum("tvc,tc->tv", Z, values) for values in (q, q_dot)))
+    deaf = together.max(axis=0) > np.maximum(effect.sum(axis=0), policy.minor_effect * limit)
+    rows = np.unique(together[:, deaf].argmax(axis=0))
+    return effect, count + len(q) + look(np.repeat(rows, columns.size), np.tile(columns, rows.size))
 
 
 def _changed(seen: Samples, rows: Array, shift: Array, rates: Array) -> Record:

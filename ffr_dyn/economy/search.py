@@ -19,15 +19,16 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from ffr_dyn.analyses.events import Event
-from ffr_dyn.analyses.forward import Forward, forward
+from ffr_dyn.analyses.forward import Forward, end_by_events
 from ffr_dyn.analyses.integration import fast_within
 from ffr_dyn.analyses.settings import Settings
 from ffr_dyn.analyses.trials.begin import Beginning
-from ffr_dyn.consistency.assemble import Assembled, assemble, body_doubts
+from ffr_dyn.consistency.assemble import assemble, body_doubts
 from ffr_dyn.economy.cache import Ledger, Tried
 from ffr_dyn.economy.checks import frequencies, stiffening_loads, stress_doubts
 from ffr_dyn.economy.contributions import Contributions, nothing, of_motion, of_omitted, own
@@ -47,7 +48,7 @@ from ffr_dyn.scene.force_kinds import forces_of
 from ffr_dyn.scene.scene import Scene
 from ffr_dyn.variants.mean_axis import in_new_frames
 from ffr_prep.common.arrays import Array
-from ffr_prep.common.errors import ComputationError, InputError
+from ffr_prep.common.errors import ComputationError
 
 Histories = tuple[Array, ...]
 
@@ -109,8 +110,13 @@ def economise(
     span, (scene, moved) = Span(start, end, output_step, stabilisation, begin), in_new_frames(scene)
     tell("assemble")
     assembled = assemble(scene, time=start)
-    if any(event.stop for event in events):
-        span = _ended(scene, assembled, span, events)
+    common: dict[str, Any] = {
+        "start": start,
+        "output_step": output_step,
+        "stabilisation": stabilisation,
+        "begin": begin,
+    }
+    span = replace(span, end=end_by_events(scene, events, end=end, assembled=assembled, **common))
     of = probe(assembled, [as_output(one, tolerance) for one in outputs], policy)
     check_meaning(of, scene, moved)
     ledger = Ledger(scene, span, of, tell, policy)
@@ -135,26 +141,6 @@ def _new_frames(found: Economy, moved: Sequence[str]) -> list[str]:
     ]
 
 
-def _ended(scene: Scene, assembled: Assembled, span: Span, events: Sequence[Event]) -> Span:
-    """The span up to the last row before the event that ends the run."""
-    result = forward(
-        scene,
-        start=span.start,
-        end=span.end,
-        output_step=span.output_step,
-        stabilisation=span.stabilisation,
-        events=events,
-        begin=span.begin,
-        assembled=assembled,
-    )
-    rows = int((result.time[-1] - span.start) / span.output_step * (1.0 + 1e-12))
-    if rows < 2:
-        raise InputError(
-            f"an event ends the run at {result.time[-1]:g} s, within two output rows; take a shorter output_step"
-        )
-    return replace(span, end=span.start + rows * span.output_step)
-
-
 # ---- rigid bodies -----------------------------------------------------------------------------------------------------
 
 
@@ -162,7 +148,7 @@ def _surely_rigid(ledger: Ledger, stiff: Rigid, omitted: Contributions) -> Chose
     """Rigid bodies, where the estimate of what they leave out is far below the tolerances; None where it is not, or where it
     cannot tell."""
     limits, model = stiff.limits, omitted.effect.sum(axis=0)
-    if _acts_between_rows(stiff.trial, ledger.span):
+    if _acts_between_rows(stiff.trial, ledger.span) or _may_be_deaf(stiff.trial):
         return None
     if limits is None or (model > ledger.policy.surely_rigid * limits).any():
         return None
@@ -189,6 +175,13 @@ def _acts_between_rows(trial: Trial, span: Span) -> bool:
     fast = fast_within(trial.made.assembled.system, steps, span.start, span.end, span.output_step)
     cornered = any(force.kinks and not force.sudden for force in forces_of(trial.scene))
     return cornered or "meeting" in trial.result.attributes or (fast is not None and len(fast.spans) > 0)
+
+
+def _may_be_deaf(trial: Trial) -> bool:
+    """Whether a force has states in which the motion does not change it, as a servo at its limit: what an estimate finds
+    there says nothing of other states. Of functions of the state nobody knows."""
+    functions = trial.made.assembled.system.user.callbacks
+    return any(one.with_state for one in functions) or any(force.deaf for force in forces_of(trial.scene))
 
 
 def _with_step(ledger: Ledger, choice: Choice, model: Array, limits: Array) -> Stepped:
@@ -356,7 +349,7 @@ def _finished(ledger: Ledger, found: Chosen, verify: bool | None) -> Economy:
         search_cost=ledger.spent - verifying,
         tried=tuple(ledger.tried),
         runs=_all_runs(ledger, found, verification),
-        unmoved=unmoved(found.omitted, found.scales, names, ledger.policy),
+        unmoved=() if _may_be_deaf(final) else unmoved(found.omitted, found.scales, names, ledger.policy),
         frequencies=frequencies(final, ledger.made(found.everything), found.everything, ledger.scene, ledger.policy),
         stiffening=stiffening_loads(final, ledger.policy),
         notes=(*_notes(ledger, final), *stress_doubts(final, ledger.scene, ledger.of, found.limits)),

@@ -51,6 +51,7 @@ from ffr_prep.common.errors import ComputationError, InputError
 ITERATIONS = 20  # of Newton's method
 TOLERANCE = 1e-9  # of its last step, rad or relative to the scene: the next would be its square
 LARGEST = 0.5  # of a step, the same
+NEAR = 0.01  # the same, of steps that lead to no other steady motion
 LEAST_SHARE = 0.01  # of the speed, by which it is followed
 BALANCED = 1e-13  # of forces relative to all, and of rows [m, -]: what is left of a balance by rounding
 NEUTRAL = 1e-13  # of a stiffness relative to the largest: rounding
@@ -296,6 +297,7 @@ class Steady:
     """A steady motion: positions x (X,), velocities v (V,), the matrices about it, and free motions Z (V, d), Z^T M Z = 1.
 
     steps : of Newton's method;  notes : what is left out of it
+    leapt : whether it may be another than that near the start
     """
 
     machine: Machine
@@ -305,29 +307,36 @@ class Steady:
     Z: Array
     steps: int
     notes: tuple[str, ...] = ()
+    leapt: bool = False
 
 
-def steady_state(assembled: Assembled, time: float, start: Array | None = None) -> Steady:
-    """The steady motion with the velocities of an assembled scene at `time` [s]; `start` (X,) is where to begin to look.
+def steady_state(
+    assembled: Assembled,
+    time: float,
+    start: Array | None = None,
+    reached: Callable[[Machine, Array], Steady] | None = None,
+) -> Steady:
+    """The steady motion with the velocities of an assembled scene at `time` [s]; `start` (X,) is where to begin to look, and
+    `reached` how it is found from there: `from_rest`, the default, or `nearby`.
 
     Raises InputError for a scene whose joints do not allow it, and for a motion that something drives or brakes;
     ComputationError where the bodies find no balance.
     """
-    system = assembled.system
+    system, reach = assembled.system, reached or from_rest
     machine = Machine(system, time, screws_of(system.layout, assembled.x, assembled.v))
     begin = assembled.x if start is None else start
-    found = _followed(machine, begin)
+    found = reach(machine, begin)
     together, refused = _together(found), _not_lasting(found)
-    if refused and (together is None or _not_lasting(_followed(together, begin))):
+    if refused and (together is None or _not_lasting(reach(together, begin))):
         raise refused
     varying, notes = np.inf if refused else _varying(found), tuple[str, ...]()
     if varying > VARIES and together is not None:
-        one = _followed(together, begin)
+        one = reach(together, begin)
         if (less := _varying(one)) < varying and not _not_lasting(one):
             found, varying, notes = one, less, (ALL_TURN,)
     notes = (*_turned_on(found.machine, found.x), *notes)  # of the motion that is taken, not of one that was tried
     if varying > VARIES:
-        found = _followed(replace(found.machine, phases=_phases(found.machine)), found.x)
+        found = reach(replace(found.machine, phases=_phases(found.machine)), found.x)
         notes = (*notes, _varies(varying, found.machine.screws.rate))
     return replace(found, notes=notes)
 
@@ -426,7 +435,19 @@ def steadily(assembled: Assembled, time: float) -> Assembled:
     return replace(assembled, x=found.x, v=found.v, notes=notes)
 
 
-def _followed(machine: Machine, x: Array) -> Steady:
+class LeapError(Exception):
+    """No steady motion is known to be near."""
+
+
+def nearby(machine: Machine, x: Array) -> Steady:
+    """By Newton's method alone. Raises LeapError where it fails or may have led to another motion than that near x."""
+    found = _newton(machine, x)
+    if found is None or found.leapt:
+        raise LeapError
+    return found
+
+
+def from_rest(machine: Machine, x: Array) -> Steady:
     """By Newton's method, or by shares of the speed that grow."""
     share, size, now, steps = 0.0, 1.0, x, 0
     while True:
@@ -447,10 +468,10 @@ def _followed(machine: Machine, x: Array) -> Steady:
 def _newton(machine: Machine, x: Array) -> Steady | None:
     """The steady motion near x, None where the steps do not come to an end."""
     place, size = machine.place, sizes_of(machine.system)
-    about = _at(machine, x).about
+    about, lengths = _at(machine, x).about, list[float]()
     for count in range(1, ITERATIONS + 1):
         Z = free_motions(about.jacobian, about.M)
-        steady = Steady(machine, x, velocities(place, machine.screws, x), about, Z, count)
+        steady = Steady(machine, x, velocities(place, machine.screws, x), about, Z, count, (), _leapt(lengths))
         if _balanced(steady):
             return steady
         closing = smallest_step(about.jacobian, about.M, -about.Phi)
@@ -458,6 +479,7 @@ def _newton(machine: Machine, x: Array) -> Steady | None:
         length = float(np.abs(y / size).max())
         if not np.isfinite(length):
             return None
+        lengths.append(length)
         lam = _multipliers(about, about.forces - about.K @ y)
         x = moved(place, x, min(1.0, LARGEST / length) * y if length else y)
         about = matrices(machine, x, lam)
@@ -466,6 +488,14 @@ def _newton(machine: Machine, x: Array) -> Steady | None:
             _require_balance(steady)
             return steady
     return None
+
+
+def _leapt(lengths: Sequence[float]) -> bool:
+    """Whether steps so long may have led to another steady motion: one is cut, or they do not halve from the first on, as
+    where there is hardly any stiffness (Deuflhard, Newton Methods for Nonlinear Problems (2004), ch. 5). Small ones lead to
+    what is near, and do not halve where a stop is met."""
+    later = max(lengths[1:], default=0.0)
+    return bool(lengths) and (max(lengths) > LARGEST or later > max(0.5 * lengths[0], NEAR))
 
 
 def _balanced(found: Steady) -> bool:

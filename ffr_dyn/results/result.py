@@ -180,7 +180,9 @@ class Result(Brief):
         found = self._find(name)
         if found is None:
             of_it = [one for one in self.quantities if one.startswith(f"{name}.")]  # of a body, a marker, a joint
-            close = of_it[:8] or get_close_matches(name, [*self.quantities, *self.components()], n=4, cutoff=0.5)
+            close = of_it[:8] or get_close_matches(
+                name, dict.fromkeys([*self.quantities, *self.components()]), n=4, cutoff=0.5
+            )
             hint = f"did you mean {', '.join(close)}?" if close else f"there are: {', '.join(self.quantities)}"
             raise InputError(f"the result has no quantity {name!r}; {hint}")
         return found

@@ -1,7 +1,8 @@
 """The measures of a run: numbers of its outputs, or whole histories.
 
-"rod.tip.position.x: range"    last, first, least, greatest, largest (of absolute values), mean, rms, range of a quantity;
-                               of one with several components the largest of them, its length for largest and rms
+"rod.tip.position.x: range"    last, first, least, greatest, largest (of absolute values), range of a quantity; mean and rms
+                               over the time; of one with several components the largest of them; largest and rms are of
+                               its length
 "hinge.force: error"           what the step costs it, of the run's own estimate [in its unit]
 "hinge.angle: history"         all rows of it, of one component
 "critical.1.speed: attribute"  what else the analysis has found: entries by name, items of lists from 1, a list by its length
@@ -33,15 +34,26 @@ def _size(y: Array) -> Array:
     return found
 
 
+def _shares(time: Array) -> Array:
+    """(T,) of the rows in a mean over the time [s], by trapezoids; equal ones of rows of one moment, as those of speeds."""
+    steps = np.diff(time)
+    if not steps.any():
+        return np.full(len(time), 1 / len(time))
+    shares: Array = (np.append(steps, 0.0) + np.append(0.0, steps)) / (2 * steps.sum())
+    return shares
+
+
 MEASURES: dict[str, Callable[[Array], float]] = {
     "last": lambda y: float(y[-1].max()),
     "first": lambda y: float(y[0].max()),
     "least": lambda y: float(y.min()),
     "greatest": lambda y: float(y.max()),
     "largest": lambda y: float(_size(y).max()),
-    "mean": lambda y: float(y.mean(axis=0).max()),
-    "rms": lambda y: float(np.sqrt((_size(y) ** 2).mean())),
     "range": lambda y: float(np.ptp(y, axis=0).max()),
+}
+MEANS: dict[str, Callable[[Array, Array], float]] = {  # of rows and their shares
+    "mean": lambda y, shares: float(np.tensordot(shares, y, 1).max()),
+    "rms": lambda y, shares: float(np.sqrt(shares @ _size(y) ** 2)),
 }
 ERROR, HISTORY, ATTRIBUTE = "error", "history", "attribute"
 TIME = "time"  # beside histories
@@ -68,7 +80,7 @@ def measured(name: str, text: str) -> Measured:
     if text.strip() in COUNTS:
         return Measured(name, text.strip(), ATTRIBUTE)
     quantity, colon, how = (part.strip() for part in text.rpartition(":"))
-    known = [*MEASURES, ERROR, HISTORY, ATTRIBUTE]
+    known = [*MEASURES, *MEANS, ERROR, HISTORY, ATTRIBUTE]
     if not colon or how not in known:
         hint = nearest(how, dict.fromkeys(known)) if colon else f"write it as QUANTITY: {' | '.join(known)}"
         raise InputError(f"outputs.{name} = {text!r}: {hint}; a formula of other outputs begins with '='")
@@ -114,7 +126,8 @@ def _value(one: Measured, result: Result) -> Number:
         return float(errors[name][0]) if name in errors else float("nan")
     if one.how == HISTORY:
         return _rows(one, result.quantity(one.quantity))
-    return MEASURES[one.how](np.asarray(result[one.quantity]))
+    rows = np.asarray(result[one.quantity])
+    return MEANS[one.how](rows, _shares(result.time)) if one.how in MEANS else MEASURES[one.how](rows)
 
 
 def _rows(one: Measured, found: Quantity) -> list[float]:

@@ -18,13 +18,14 @@ term is "stiffening", the second-order displacement, and with it geometric stiff
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from ffr_dyn.scene.force_kinds import in_bases, modal_fields
+from ffr_dyn.scene.parts import owner
 from ffr_dyn.scene.scene import INERTIA_TERMS, Body, Scene, used_interfaces
 from ffr_dyn.variants.condensation import statically_complete
 from ffr_prep.body import FlexibleBody, of_fewer_shapes, recombined, truncated
@@ -86,7 +87,7 @@ def with_modes(body: Body, keep: Modes, interfaces: Iterable[str] | None = None)
 
     Damping ratios become those of the damping matrix in the new coordinates, without what couples these.
 
-    Raises InputError for a scene, of which `vary` makes one with fewer modes.
+    Raises InputError for a scene, of which `vary` makes one with fewer modes, and for a body in parts.
 
     >>> rod = fd.with_modes(rod, 4)
     """
@@ -94,6 +95,11 @@ def with_modes(body: Body, keep: Modes, interfaces: Iterable[str] | None = None)
         raise InputError(
             f"with_modes takes a body of a scene, fd.Body(...), not a {type(body).__name__}: of a whole scene "
             "fd.vary(scene, modes=4) keeps 4 modes of every body"
+        )
+    if body.model.parts:
+        raise InputError(
+            f"body {body.name!r} is in {len(body.model.parts)} parts, which have modes of their own: "
+            "fd.vary(scene, modes=4) keeps 4 modes of each part"
         )
     if not isinstance(keep, (int, np.integer)):
         at = np.asarray(keep, int)
@@ -178,45 +184,51 @@ def vary(
              are kept of the interfaces at which something acts
     drop   : `TERMS` to leave out of all bodies, or by body name
     rigid  : names of bodies that become rigid
-    models : by body name, another body for it (see `with_model`); modes are kept of that one
+    models : by body name, another body for it (see `with_model`); modes are kept of that one, or of each of its parts
 
     Forces on elastic coordinates are expressed in the new ones. Raises InputError for names that do not exist.
 
     >>> cheaper = fd.vary(scene, modes=4, drop=("I9",))
     """
+    scene, rigid = _remade(scene, models), tuple(rigid)
     names = [body.name for body in scene.bodies]
-    rigid = tuple(rigid)
     wanted: dict[str, Modes] = _by_name(
-        {} if modes is None else modes, [b.name for b in scene.bodies if b.model.n or b.name in models], names
+        {} if modes is None else modes, [b.name for b in scene.bodies if b.model.n], scene
     )
-    wanted |= dict.fromkeys(_known(rigid, names), 0)
-    without = _by_name(drop, names, names)
-    _known(models, names)
-    bodies, models = [], dict(models)
+    wanted |= _by_name(dict.fromkeys(rigid, 0), (), scene)
+    without = _by_name(drop, names, scene)
+    bodies = []
     for body in scene.bodies:
-        made = with_model(body, models[body.name]) if body.name in models else body
-        models[body.name] = made.model
         used = used_interfaces(scene, body)
-        kept = with_modes(made, wanted[body.name], used) if body.name in wanted else made
+        kept = with_modes(body, wanted[body.name], used) if body.name in wanted else body
         bodies.append(without_terms(kept, without.get(body.name, ())))
     modal = {force.body for force in scene.forces if modal_fields(force)}
     bases = {
-        body.name: basis_of(models[body.name], wanted.get(body.name, models[body.name].n), used_interfaces(scene, body))
+        body.name: basis_of(body.model, wanted.get(body.name, body.model.n), used_interfaces(scene, body))
         for body in scene.bodies
         if body.name in modal
     }
     return replace(scene, bodies=tuple(bodies), forces=in_bases(scene.forces, bases))
 
 
-def _by_name(given: Any, everywhere: Iterable[str], names: list[str]) -> dict[str, Any]:
-    """The values by name of a setting that is given by name, or once for all that it concerns."""
-    if isinstance(given, Mapping):
-        return dict(_known(given, names))
-    return dict.fromkeys(everywhere, given)
+def _remade(scene: Scene, models: Mapping[str, FlexibleBody]) -> Scene:
+    """The scene with other bodies for some, in their parts where they have parts."""
+    _check_known(models, [body.name for body in scene.bodies])
+    made = (with_model(body, models[body.name]) if body.name in models else body for body in scene.bodies)
+    forces = in_bases(scene.forces, {name: np.eye(model.n) for name, model in models.items()})
+    return replace(scene, bodies=tuple(made), forces=forces) if models else scene
 
 
-def _known(given: Any, names: list[str]) -> Any:
+def _by_name(given: Any, everywhere: Iterable[str], scene: Scene) -> dict[str, Any]:
+    """The values by name of a setting that is given by name, of a whole for its parts, or once for all that it concerns."""
+    if not isinstance(given, Mapping):
+        return dict.fromkeys(everywhere, given)
+    _check_known(given, dict.fromkeys(name for body in scene.bodies for name in (body.name, owner(body))))
+    values = ((body.name, given.get(body.name, given.get(owner(body)))) for body in scene.bodies)
+    return {name: value for name, value in values if value is not None}
+
+
+def _check_known(given: Iterable[str], names: Collection[str]) -> None:
     for name in given:
         if name not in names:
             raise InputError(f"there is no body {name!r} to vary; there are: {', '.join(names)}")
-    return given

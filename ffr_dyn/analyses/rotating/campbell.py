@@ -17,13 +17,11 @@ import numpy as np
 from scipy.optimize import brentq
 
 from ffr_dyn.analyses.registry import OfMoment, option
-from ffr_dyn.analyses.rotating.steady import SPEEDS, TURN, distinct, growing, rounding
+from ffr_dyn.analyses.rotating.steady import SPEEDS, TURN, distinct, followed_to, growing, rounding
 from ffr_dyn.analyses.settings import MomentSettings
-from ffr_dyn.consistency.assemble import assemble, seen_in_space
 from ffr_dyn.linear.prestrained import told
 from ffr_dyn.linear.spectrum import Spectrum, followed, spectrum
-from ffr_dyn.linear.speeds import at_speed, speed_list
-from ffr_dyn.linear.steady_state import steady_state
+from ffr_dyn.linear.speeds import speed_list
 from ffr_dyn.linear.whirl import ONE_WAY, damping_ratios
 from ffr_dyn.results.file import save_result
 from ffr_dyn.results.result import Axis, Quantity, Result
@@ -36,8 +34,8 @@ from ffr_prep.common.progress import no_count
 MODES = 10
 MET = 1e-8  # of the speed of a crossing, relative to the range
 
-AtSpeed = Callable[[float, Spectrum | None], Spectrum]
 Row = tuple[float, Spectrum]
+AtSpeed = Callable[[float, Row | None], Spectrum]
 Measure = Callable[[float, Spectrum, int], float]
 
 
@@ -148,8 +146,8 @@ def campbell(
 def _spectra(at: AtSpeed, values: Sequence[float], modes: int, progress: Callable[[int, int], None]) -> list[Spectrum]:
     """The vibrations at every speed, each in its place. InputError where there are none."""
     spectra = list[Spectrum]()
-    for speed in values:
-        one = at(speed, spectra[-1] if spectra else None)
+    for k, speed in enumerate(values):
+        one = at(speed, (values[k - 1], spectra[-1]) if spectra else None)
         spectra.append(followed(spectra[-1], one) if spectra else one)
         progress(len(spectra), len(values) + min(modes, spectra[0].values.size))
     if not spectra[0].values.size:
@@ -171,10 +169,9 @@ def _slowest(spectra: Sequence[Spectrum], whirling: Array) -> Array:
     return np.lexsort((modulus, decays))
 
 
-def _at_speeds(scene: Scene, turn: str, time: float) -> Callable[[float, Spectrum | None], Spectrum]:
-    def at(speed: float, near: Spectrum | None) -> Spectrum:
-        assembled = assemble(seen_in_space(at_speed(scene, speed, turn, time)), time=time)
-        return spectrum(steady_state(assembled, time, near.found.x if near else None))
+def _at_speeds(scene: Scene, turn: str, time: float) -> AtSpeed:
+    def at(speed: float, near: Row | None) -> Spectrum:
+        return spectrum(followed_to(scene, speed, turn, time, near and (near[0], near[1].found))[1])
 
     return at
 
@@ -220,7 +217,7 @@ def _criticals(
 
 def _row_at(at: AtSpeed, rows: Sequence[Row], speed: float) -> Row:
     near = min(rows, key=lambda row: abs(row[0] - speed))
-    return near if near[0] == speed else (speed, followed(near[1], at(speed, near[1])))
+    return near if near[0] == speed else (speed, followed(near[1], at(speed, near)))
 
 
 def _growth(speed: float, one: Spectrum, m: int) -> float:

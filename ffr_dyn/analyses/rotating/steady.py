@@ -6,7 +6,7 @@ What a steady motion is and how it is found, `ffr_dyn.linear.steady_state` says.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -21,15 +21,17 @@ from ffr_dyn.consistency.doubts import checked
 from ffr_dyn.consistency.evaluation import evaluator, joined, record_states
 from ffr_dyn.linear.spectrum import Spectrum, spectrum
 from ffr_dyn.linear.speeds import at_speed, speed_list
+from ffr_dyn.linear.steady_state import LeapError, from_rest, nearby, steady_state
 from ffr_dyn.linear.steady_state import Steady as Found
-from ffr_dyn.linear.steady_state import steady_state
 from ffr_dyn.results.quantities import selected
 from ffr_dyn.results.result import Quantity, Result
 from ffr_dyn.scene.described import described
 from ffr_dyn.scene.scene import Scene, require_scene
 from ffr_prep.common.arrays import Array
+from ffr_prep.common.errors import ComputationError
 from ffr_prep.common.progress import no_count
 
+CLOSEST = 256  # parts of the way between two speeds, at most, by which a motion is followed
 GROWS = 1e-7  # of a real part relative to the eigenvalue, or the speed: what is no rounding
 TURN = option("--turn", "What has the speed: a driver, or a joint coordinate such as hinge.angle.", metavar="NAME")
 SPEEDS = option("--speed", "Speed: 314 [rad/s], '3000 rpm', 0..500, '0..6000 rpm:13'; repeat.", metavar="SPEED")
@@ -152,9 +154,54 @@ def steady_states(
     scene: Scene, speeds: Sequence[float | str], turn: str = "", time: float = 0.0
 ) -> Iterator[tuple[Assembled, Found]]:
     """The scene in space and its steady state, at every speed, each beginning where the last one ended."""
-    last = None
-    for one in [at_speed(scene, speed, turn, time) for speed in speed_list(speeds)] or [scene]:
-        assembled = assemble(seen_in_space(one), time=time)
-        found = steady_state(assembled, time, last)
-        last = found.x
+    values = speed_list(speeds)
+    if not values:
+        assembled = assemble(seen_in_space(scene), time=time)
+        yield assembled, steady_state(assembled, time)
+    last: tuple[float, Found] | None = None
+    for speed in values:
+        assembled, found = followed_to(scene, speed, turn, time, last)
+        last = speed, found
         yield assembled, found
+
+
+def followed_to(
+    scene: Scene, speed: float, turn: str, time: float, last: tuple[float, Found] | None
+) -> tuple[Assembled, Found]:
+    """The scene in space and its steady state at a speed [rad/s]: that which the one at the `last` speed becomes.
+
+    Newton's method from there may leap to another, as from an arm that swings out to one that hangs, where stiffness is low.
+    Speeds between are taken then, and a note tells where it leaps all the same.
+    """
+    if last is None or last[0] == speed:
+        return _at(scene, speed, turn, time, last and last[1].x)
+    here, found = last
+    step, least = speed - here, abs(speed - here) / CLOSEST
+    while True:
+        goal = speed if abs(speed - here) <= abs(step) * (1 + 1e-9) else here + step
+        near = _near(scene, goal, turn, time, found.x)
+        if near is None and abs(step) > least:
+            step /= 4
+        elif near is None:
+            assembled, other = _at(scene, speed, turn, time, found.x)
+            leap = f"from {here:.6g} rad/s on the steady motion ends, or leaps to another"
+            return assembled, replace(other, notes=(leap, *other.notes))
+        elif goal == speed:
+            return near
+        else:
+            here, found, step = goal, near[1], 2 * step
+
+
+def _near(scene: Scene, speed: float, turn: str, time: float, start: Array) -> tuple[Assembled, Found] | None:
+    """The steady state that is near to one (X,) at another speed; None where none is found."""
+    try:
+        return _at(scene, speed, turn, time, start, nearby)
+    except (ComputationError, LeapError):
+        return None
+
+
+def _at(
+    scene: Scene, speed: float, turn: str, time: float, start: Array | None, reached: Callable[..., Found] = from_rest
+) -> tuple[Assembled, Found]:
+    assembled = assemble(seen_in_space(at_speed(scene, speed, turn, time)), time=time)
+    return assembled, steady_state(assembled, time, start, reached)

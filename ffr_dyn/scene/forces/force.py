@@ -103,6 +103,11 @@ class Force(ABC):
         """The numbers of the law that the kernel reads."""
 
     @property
+    def deaf(self) -> bool:
+        """Whether there are states in which the motion changes it no more: a stop that is not met, friction that slides."""
+        return self.sudden
+
+    @property
     def kinks(self) -> tuple[Kink, ...]:
         """Where the law has a kink; steps of a fixed length end there."""
         return ()

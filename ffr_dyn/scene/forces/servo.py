@@ -66,6 +66,10 @@ class Servo(Force):
         return self.kp * (target - c) + self.kd * (speed - rate)
 
     @property
+    def deaf(self) -> bool:
+        return self.limit < np.inf
+
+    @property
     def stiff_coordinates(self) -> tuple[int, ...]:
         return (0,) if self.kp or self.kd else ()
 

@@ -34,11 +34,11 @@ def test_how_far_a_whirl_is_from_the_speed_is_smooth_where_it_stands_still():
     at, off = _at_speeds(rotor(), "", 0.0), _off_order(True, 1.0)
     near = at(200.0, None)
     m = near.names.index("shaft: first bending, forward")
-    critical = 200.0 + off(200.0, followed(near, at(200.0, near)), m)
+    critical = 200.0 + off(200.0, followed(near, at(200.0, (200.0, near))), m)
     for _ in range(3):
-        critical += off(critical, followed(near, at(critical, near)), m)
+        critical += off(critical, followed(near, at(critical, (200.0, near))), m)
     beside = critical + np.array([-1e-2, -1e-4, -1e-5, 0.0, 1e-5, 1e-4, 1e-2])
-    found = [off(speed, followed(near, at(speed, near)), m) for speed in beside]
+    found = [off(speed, followed(near, at(speed, (200.0, near))), m) for speed in beside]
     np.testing.assert_allclose(found, critical - beside, atol=1e-3)
 
 

@@ -22,6 +22,8 @@ from PIL import Image
 from places import ROOT
 from synthetic import cloud
 
+from ffr_dyn.analyses.events import Event
+from ffr_dyn.analyses.forward import forward
 from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.analyses.kinematic import Kinematic
 from ffr_dyn.analyses.settings import Settings
@@ -276,6 +278,23 @@ def test_models_of_one_label_are_refused():
     scene = swinging()
     with pytest.raises(InputError, match="2 models with the label 'full model'"):
         work_precision(scene, SPAN, Here(), models=(FULL, Model(modes=2)))
+
+
+def test_runs_that_an_event_ends_are_compared_up_to_there():
+    scene = rigid()
+    low = Event("low", "arm.b.position.y", -0.6, direction="falling", stop=True)
+    told: list[str] = []
+    how = {"methods": {"rk4": (0.01,)}, "measures": measures_of(scene, ["position:arm.b"]), "repeats": 1}
+    found = work_precision(scene, Span(1.0, 0.05), Here(), events=(low,), tell=told.append, **how)
+    heights = found.reference.values["position:arm.b"][:, 1]
+    assert len(heights) == 1 + int(forward(scene, end=1.0, output_step=0.05, events=(low,)).time[-1] / 0.05)
+    assert heights.min() > -0.6
+    assert told[0].startswith("an event ends the run")
+    late = replace(low, value=-2.0)
+    assert (
+        len(work_precision(scene, Span(1.0, 0.05), Here(), events=(late,), **how).reference.values["position:arm.b"])
+        == 21
+    )
 
 
 def test_a_step_that_is_named_twice_is_run_once():

@@ -59,7 +59,7 @@ from ffr_dyn.integrators import ROS2, ROS3
 from ffr_dyn.integrators.stabilisation import Projection
 from ffr_dyn.results.result import Result
 from ffr_dyn.scene.drivers import Driver
-from ffr_dyn.scene.forces import JointFriction, JointSpring, JointStop, Load
+from ffr_dyn.scene.forces import JointFriction, JointSpring, JointStop, Load, Servo
 from ffr_dyn.scene.joints import Joint
 from ffr_dyn.scene.scene import Body, Scene
 from ffr_dyn.scene.sensors import Measurement, StressMeasurement
@@ -215,6 +215,21 @@ def test_cost_grows_with_what_is_modelled():
     )
     once, thrice, more = (of_run(replace(everything, divisions=d), 10) for d in (1, 3, 5))
     assert thrice - once == pytest.approx(more - thrice)  # in the number of steps; rows cost something too
+
+
+def test_a_servo_at_its_limit_does_not_hide_what_bodies_do_to_it():
+    """Its torque is the same in all states in which modes are largest, and another where it is not at its limit."""
+    scene = replace(pendulum(7e9), gravity=(0, 0, 0))
+    servo = Servo("servo", "hinge", target=0.6, kp=100.0, kd=10.0, limit=20.0)
+    scene = replace(scene, forces=(servo,))
+    ledger, everything = looked_at(scene, ("servo.torque",), 1.2, 0.02, divisions=4)
+    pilot, stiff = ledger.run(everything), ledger.run(rigid(everything))
+    true = largest(difference(stiff.values, pilot.values))
+    assert of_omitted(ledger, stiff, everything, 0.02 * true).effect.sum(axis=0) > true
+    quick = replace(servo, kp=1000.0, kd=100.0, limit=10.0)  # at its limit in all states that are looked at
+    found = economise(replace(scene, forces=(quick,)), ["servo.torque=10%"], end=1.2, output_step=0.02, verify=False)
+    assert any(part.modes for part in found.choice.parts)
+    assert not found.unmoved
 
 
 # ---- terms ----------------------------------------------------------------------------------------------------------

@@ -123,6 +123,7 @@ def around(value: float) -> tuple[float, float]:
 def surely_rigid(policy: Policy, patch: Any) -> Any:
     """Whether rigid bodies are believed without a run of everything."""
     patch.setattr(search, "_acts_between_rows", lambda trial, span: False)
+    patch.setattr(search, "_may_be_deaf", lambda trial: False)
 
     def decided(effect: float) -> bool:
         ledger = runs(policy)
@@ -518,7 +519,7 @@ def samples(policy: Policy, patch: Any) -> Any:
 
 
 def looks(policy: Policy, patch: Any) -> Any:
-    """States looked at of a coordinate of so much effect."""
+    """States looked at of a coordinate of so much effect, and all fifty of the motion."""
 
     def count(effect: float) -> int:
         patch.setattr(contributions, "_changed", lambda seen, rows, shift, rates: len(rows))
@@ -711,8 +712,8 @@ FIGURES: dict[str, Figure] = {
     "least_samples": Figure(samples, [24, 125]),
     "rows_per_sample": Figure(samples, [24, 125]),
     "remainder": Figure(remainder, [True, False]),
-    "looks_at_effect": Figure(looks, [1, 4]),
-    "minor_effect": Figure(looks, [1, 4]),
+    "looks_at_effect": Figure(looks, [51, 54]),
+    "minor_effect": Figure(looks, [51, 54]),
     "constraint_weight": Figure(constraint_weight, 1e-10),
     "finest_tolerance": Figure(finest_tolerance, [True, False]),
     "still": Figure(lambda policy, patch: still(policy, "m", 1e-12), [True, False]),

@@ -15,6 +15,7 @@ from ffr_dyn.consistency.assemble import assemble, in_space
 from ffr_dyn.consistency.evaluation import evaluate, evaluator
 from ffr_dyn.consistency.tangent import chart, state_matrix
 from ffr_dyn.equations.layout import to_body_axes
+from ffr_dyn.functions.curves import curve_value
 from ffr_dyn.linear.eigen import eigen
 from ffr_dyn.linear.matrices import reduced
 from ffr_dyn.linear.matrices import state_matrix as steady_matrix
@@ -34,6 +35,42 @@ def governor(speed: float, length: float = 1.0) -> fd.Scene:
     return fd.Scene(
         (fd.Body("spindle", spindle), out), joints, (motor,), ground={"O": (0, 0, 0)}, gravity=(0, 0, -9.81)
     )
+
+
+def test_a_governor_stays_out_from_speed_to_speed():
+    """From far out it falls not back to hanging, where Newton's method leads from the last speed at once: closed form."""
+    speeds, (across, along) = np.array([4.0, 6.0, 12.0]), (1 / 3, 0.01 / 12)
+    cosine = 0.5 * 9.81 / speeds**2 / (across - along)
+    found = fd.steady(governor(4.0), speeds=tuple(speeds), turn="motor")
+    np.testing.assert_allclose(-found["arm.b.position"][:, 2], cosine, rtol=1e-8)
+    diagram = fd.campbell(governor(4.0), speeds=speeds, turn="motor")
+    vibrations = speeds * np.sqrt((1 - cosine**2) * (across - along) / across) / (2 * np.pi)
+    np.testing.assert_allclose(diagram["frequencies"][:, 0], vibrations, rtol=1e-8)
+    assert diagram.attributes["limits"] == []
+
+
+@pytest.mark.slow  # with the governor above
+def test_a_steady_motion_that_ends_is_told():
+    """A block on a spoke, whose spring gives way and then hardens: from 31.8 rad/s on only the far balance is left."""
+    hub = fd.rigid_body("hub", mass=1.0, inertia=(1, 1, 1), points={"o": (0, 0, 0)})
+    block = fd.rigid_body("block", mass=1.0, inertia=(0.01, 0.01, 0.01), points={"c": (0, 0, 0)})
+    joints = (
+        fd.Joint("axle", "revolute", "ground.O", "hub.o"),
+        fd.Joint("spoke", "translational", "hub.o", "block.c", axis=(1, 0, 0)),
+    )
+    force = fd.Curve((-0.05, 0.0, 0.05, 0.1, 0.3), (-200.0, 0.0, 150.0, 155.0, 900.0))
+    scene = fd.Scene(
+        (fd.Body("hub", hub), fd.Body("block", block, position=(0.1, 0, 0))), joints,
+        (fd.Driver("motor", "axle", fd.polynomial(0.0, 1.0)),), ground={"O": (0, 0, 0)},
+        forces=(fd.JointSpring("spring", "spoke", stiffness=force, free=0.1, coordinate="stroke"),),
+    )  # fmt: skip
+    found = fd.steady(scene, speeds=(20.0, 31.0, 31.5, 35.0), turn="motor")
+    for speed, stroke in zip(found["speed"], found["spoke.stroke"], strict=True):
+        assert speed**2 * stroke == pytest.approx(curve_value(force, stroke - 0.1), rel=1e-8)
+    assert [stroke > 0.2 for stroke in found["spoke.stroke"]] == [False, False, False, True]
+    leap = [float(note.split()[1]) for note in found.attributes["notes"] if "leaps to another" in note]
+    assert leap == pytest.approx([31.77], abs=0.02)
+    assert not any("leaps" in note for note in fd.steady(scene, speeds=(5.0, 31.0), turn="motor").attributes["notes"])
 
 
 def test_a_governor_swings_out_and_vibrates_as_it_should():

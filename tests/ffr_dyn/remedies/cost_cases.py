@@ -216,6 +216,7 @@ VARIANTS = [
     Case(p(with_model, Body("c", cloud(2), damping=(0.1, 0.2)), cloud(3)),
          p(with_model, Body("c", cloud(2), damping=0.1), cloud(3))),
     Case(p(with_modes, SWING, 1), p(vary, SWING, modes=1)),
+    Case(lambda: with_modes(Body("cloud", in_parts().bodies["cloud"]), 1), lambda: replace(in_parts(), modes=1).of(SWING)),
     Case(lambda: vary(SWING, modes={"clod": 1}), lambda: vary(SWING, modes={"cloud": 1})),
 ]  # fmt: skip
 CASES = CHARTS + ECONOMY + VARIANTS

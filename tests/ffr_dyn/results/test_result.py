@@ -88,6 +88,8 @@ def test_an_unknown_name_suggests_close_ones():
         sample()["rod.R.w"]
     with pytest.raises(InputError, match=r"there are: rod\.R, rod\.p"):
         sample()["?"]
+    with pytest.raises(InputError, match=r"did you mean spring\.tension\?"):
+        Result(np.zeros(1), {"spring.tension": Quantity(np.zeros(1), "N")})["spring.tensoin"]
 
 
 def test_a_result_cannot_be_changed():

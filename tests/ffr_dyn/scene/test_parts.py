@@ -28,6 +28,7 @@ from ffr_dyn.scene.scene import Body, Scene
 from ffr_dyn.scene.sensors import SectionMeasurement, StressMeasurement
 from ffr_dyn.scene_file.read import load_scene
 from ffr_dyn.scene_file.write import save_scene
+from ffr_dyn.variants.variant import vary
 from ffr_prep.body import FlexibleBody
 from ffr_prep.common.errors import InputError
 from ffr_prep.model.coupled import InterfaceRegion
@@ -74,6 +75,23 @@ def pushed(model: FlexibleBody, **more: object) -> Scene:
 
 def whole() -> Scene:
     return pushed(beam(None))
+
+
+# ---- variants ----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("modes", [0, 3])
+def test_a_body_file_in_parts_has_as_many_modes_as_are_asked_for(modes):
+    """Of each part, as where the scene has the parts; a damped body has one ratio still."""
+    scene = replace(whole(), bodies=(replace(whole().bodies[0], damping=0.02),))
+    varied = vary(scene, modes=modes, drop=("I5",), models={"beam": beam(3)})
+    assert [body.name for body in varied.bodies] == ["beam_1", "beam_2", "beam_3"]
+    assert [body.model.n for body in varied.bodies] == [modes] * 3
+    assert all(body.dropped == ("I5",) for body in varied.bodies)
+    parted = replace(whole(), bodies=(Body("beam", beam(3), damping=0.02),))
+    for one, other in zip(varied.bodies, vary(parted, modes={"beam": modes}).bodies, strict=True):
+        np.testing.assert_array_equal(one.model.omega2, other.model.omega2)
+        np.testing.assert_array_equal(one.damping, other.damping)
 
 
 # ---- the scene ----------------------------------------------------------------------------------------------------

@@ -15,6 +15,7 @@ from places import ROOT
 
 import ffr_dyn as fd
 import ffr_prep.cli
+from ffr_dyn.results.result import Quantity, Result
 from ffr_dyn.studies import draw
 from ffr_dyn.studies.draw import running_mean, tornado
 from ffr_dyn.studies.measures import attribute, measured
@@ -435,13 +436,27 @@ def test_measures_are_what_they_are_called(folder):
     force = result["hinge.force"]
     expected = {
         "hinge.force.y: least": force[:, 1].min(), "hinge.force: greatest": force.max(),
-        "hinge.force.y: mean": force[:, 1].mean(),
-        "hinge.force: rms": np.sqrt((force**2).sum(axis=1).mean()), "hinge.force: range": np.ptp(force, axis=0).max(),
+        "hinge.force.y: mean": np.trapezoid(force[:, 1], result.time) / np.ptp(result.time),
+        "hinge.force: rms": np.sqrt(np.trapezoid((force**2).sum(axis=1), result.time) / np.ptp(result.time)),
+        "hinge.force: range": np.ptp(force, axis=0).max(),
         "hinge.angle: first": result["hinge.angle"][0], "hinge.force: error": result.attributes["errors"]["hinge.force"][0],
     }  # fmt: skip
     outputs = tuple(measured(f"o{k}", text) for k, text in enumerate(expected))
     found = values(outputs, result, {})
     np.testing.assert_allclose(list(found.values()), list(expected.values()), rtol=1e-14)
+
+
+def test_means_are_over_the_time_however_rows_stand():
+    """Of sin over a period and of t, with a last row soon after the one before, as where an event ends a run."""
+    from ffr_dyn.studies.measures import values
+
+    time = np.append(np.linspace(0.0, 1.0, 41), 1.0 + 1e-9)
+    wave, ramp = (Quantity(y, "m") for y in (np.sin(2 * np.pi * time), time))
+    outputs = tuple(measured(text, text) for text in ("wave: mean", "wave: rms", "ramp: mean"))
+    found = values(outputs, Result(time, {"wave": wave, "ramp": ramp}), {})
+    np.testing.assert_allclose(list(found.values()), [0.0, 0.5**0.5, 0.5], atol=1e-8)
+    at_speeds = Result(np.zeros(3), {"wave": Quantity(np.array([1.0, 2.0, 6.0]), "m")})
+    assert values(outputs[:1], at_speeds, {}) == {"wave: mean": 3.0}
 
 
 STRIP = """
