@@ -969,17 +969,19 @@ INPUT = [
     Case(window, lambda: written(fd.show, HINGED, "a.html")),
     Case(lambda: tabled(None), lambda: tabled(PANDAS)),
 ]
-CASES = (
-    RUNS
-    + INPUT
-    + command_cases.CASES
-    + cost_cases.CASES
-    + result_cases.CASES
-    + scene_cases.CASES
-    + analysis_cases.CASES
-    + study_cases.CASES
-    + analysis_cases.BENT
-)
+KINDS = {
+    "runs": RUNS,
+    "input": INPUT,
+    "command": command_cases.CASES,
+    "cost": cost_cases.CASES,
+    "result": result_cases.CASES,
+    "scene": scene_cases.CASES,
+    "analysis": analysis_cases.CASES,
+    "study": study_cases.CASES,
+    "bent": analysis_cases.BENT,
+}
+CASES = tuple(case for cases in KINDS.values() for case in cases)
+NAMES = [f"{kind} {k}" for kind, cases in KINDS.items() for k in range(len(cases))]
 
 
 # ---- the texts ------------------------------------------------------------------------------------------------------------
@@ -999,7 +1001,7 @@ def message(number: int) -> str:
     return str(caught.value)
 
 
-@pytest.mark.parametrize("number", range(len(CASES)))
+@pytest.mark.parametrize("number", range(len(CASES)), ids=NAMES)
 def test_a_text_is_raised_and_its_remedy_works(number):
     said = message(number)
     assert any(text.search(said) for found in texts().values() for text in found), said

@@ -24,17 +24,19 @@ PARTS: dict[str, tuple[str, ...]] = {
     "common/outputs.py": ("not_written", "_in_use"),
     "common/reading.py": ("not_of_its_ending",),
 }
-CASES = (
-    prep_command_cases.CASES
-    + prep_model_cases.CASES
-    + prep_mesh_cases.CASES
-    + prep_structure_cases.CASES
-    + prep_matrix_cases.CASES
-    + prep_exchange_cases.CASES
-    + prep_source_cases.CASES
-    + prep_numerics_cases.CASES
-    + prep_body_cases.CASES
-)
+KINDS = {
+    "command": prep_command_cases.CASES,
+    "model": prep_model_cases.CASES,
+    "mesh": prep_mesh_cases.CASES,
+    "structure": prep_structure_cases.CASES,
+    "matrix": prep_matrix_cases.CASES,
+    "exchange": prep_exchange_cases.CASES,
+    "source": prep_source_cases.CASES,
+    "numerics": prep_numerics_cases.CASES,
+    "body": prep_body_cases.CASES,
+}
+CASES = tuple(case for cases in KINDS.values() for case in cases)
+NAMES = [f"{kind} {k}" for kind, cases in KINDS.items() for k in range(len(cases))]
 
 
 @cache
@@ -50,7 +52,7 @@ def message(number: int) -> str:
     return str(caught.value)
 
 
-@pytest.mark.parametrize("number", range(len(CASES)))
+@pytest.mark.parametrize("number", range(len(CASES)), ids=NAMES)
 def test_a_text_is_raised_and_its_remedy_works(number):
     assert message(number)
     CASES[number].mended()
