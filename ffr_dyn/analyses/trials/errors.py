@@ -130,7 +130,9 @@ def _by_shown_order(
     farther = _farther(runs, trial.method, trial.count)
     shown = min(order, order_shown(trial.result, other, farther, order))
     errors = _errors(trial.result, other, shown, twins)
-    return errors if farther is None else larger(errors, _errors(trial.result, farther, shown, ())), shown
+    if farther is None or not runs.feels:
+        return errors, shown
+    return larger(errors, _errors(trial.result, farther, shown, ())), shown
 
 
 def _moments(
