@@ -31,7 +31,7 @@ from ffr_prep.common.arrays import Array
 STEP = 1e-6  # m, rad, m/s, rad/s: how near a kink is at the state
 SMALLER = 0.1  # by which the step becomes smaller: a smooth slope then changes by as much less
 KEPT = 0.5  # of the change of a slope by a kink, in spite of that
-BENT, STEEP = 1e-3, 0.1  # of a slope: a change by a kink that counts, and one that counts although it is smooth
+BENT = 1e-3  # of a slope: a change by a kink that counts; and as good as none, as before a stop that begins softly
 ROUNDING = 64 * np.finfo(float).eps  # of forces, over the step
 POSITION, VELOCITY = "position", "velocity"
 
@@ -87,7 +87,7 @@ def _in_state(force: Force, c: Array, rate: Array, now: At) -> Array:
 
 def has_kink(function: Callable[[Array], Any], size: int, far: float) -> bool:
     """Whether a function of `size` changes, of what is as large as `far`, has slopes that differ on the two sides of zero, or
-    from each other within the step."""
+    hardly any on one side of it."""
     h, here = STEP * max(1.0, FAR * far), np.ravel(function(np.zeros(size)))
     for direction in np.eye(size):
         try:
@@ -96,7 +96,7 @@ def has_kink(function: Callable[[Array], Any], size: int, far: float) -> bool:
             continue
         (wide, slope, other, _), (narrow, _, _, rounding) = bends
         kink = narrow > np.maximum(KEPT * wide, BENT * slope)
-        if ((kink | (other < (1 - STEEP) * slope)) & (narrow > rounding)).any():
+        if ((kink | (other < BENT * slope)) & (narrow > rounding)).any():
             return True
     return False
 
