@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ast
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from places import ROOT
@@ -19,6 +19,12 @@ class Case:
 
     raised: Callable[[], object]
     mended: Callable[[], object]
+
+
+def numbered(kinds: Mapping[str, Sequence[Case]]) -> tuple[tuple[Case, ...], list[str]]:
+    """All cases, and a name of each by its kind and its number there: new ones change no names of other kinds."""
+    names = [f"{kind} {k}" for kind, cases in kinds.items() for k in range(len(cases))]
+    return tuple(case for cases in kinds.values() for case in cases), names
 
 
 def texts_of(package: str, parts: Mapping[str, tuple[str, ...]]) -> dict[str, tuple[re.Pattern[str], ...]]:

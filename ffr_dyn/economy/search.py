@@ -169,17 +169,16 @@ def _surely_rigid(ledger: Ledger, stiff: Rigid, omitted: Contributions) -> Chose
 
 
 def _acts_between_rows(trial: Trial, span: Span) -> bool:
-    """Whether a stop is met, a spring may come to a corner of its curve, or a force comes and goes within a row: that sets
-    off vibrations of which the loads at rows, that the estimate goes by, know nothing."""
+    """Whether a force comes and goes within a row: that sets off vibrations of which the loads at rows, that the estimate
+    goes by, know nothing."""
     steps = trial.choice.integrator(span.output_step)
     fast = fast_within(trial.made.assembled.system, steps, span.start, span.end, span.output_step)
-    cornered = any(force.kinks and not force.sudden for force in forces_of(trial.scene))
-    return cornered or "meeting" in trial.result.attributes or (fast is not None and len(fast.spans) > 0)
+    return fast is not None and len(fast.spans) > 0
 
 
 def _may_be_deaf(trial: Trial) -> bool:
-    """Whether a force has states in which the motion does not change it, as a servo at its limit: what an estimate finds
-    there says nothing of other states. Of functions of the state nobody knows."""
+    """Whether a force has states in which the motion does not change it, as a servo at its limit or a stop that is not met:
+    what an estimate finds there says nothing of other states. Of functions of the state nobody knows."""
     functions = trial.made.assembled.system.user.callbacks
     return any(one.with_state for one in functions) or any(force.deaf for force in forces_of(trial.scene))
 

@@ -105,7 +105,7 @@ class Bushing(Force):
         force: Array = np.array(self.preload) - self.stiffness_matrix @ c - self.damping_matrix @ rate - curves
         return force
 
-    @property
+    @cached_property
     def kinks(self) -> tuple[Kink, ...]:
         return tuple(
             Kink(-at, number=k) for k, curve in enumerate(self.curves) if curve is not None for at in corners(curve)

@@ -104,8 +104,9 @@ class Force(ABC):
 
     @property
     def deaf(self) -> bool:
-        """Whether there are states in which the motion changes it no more: a stop that is not met, friction that slides."""
-        return self.sudden
+        """Whether there are states in which the motion changes it no more: a stop that is not met, friction that slides,
+        a spring within its backlash."""
+        return self.sudden or bool(self.kinks)
 
     @property
     def kinks(self) -> tuple[Kink, ...]:

@@ -10,15 +10,13 @@ from ffr_dyn.functions.curves import Curve
 from ffr_dyn.scene.fields import COORDINATE, DAMPING, FORCE, RATE, STIFFNESS, Curved, In
 from ffr_dyn.scene.force_kinds import register_force
 from ffr_dyn.scene.forces.checks import check_damping, check_number, check_number_or_curve
-from ffr_dyn.scene.forces.force import Force, Kink, LawNumbers, LoadTable, Moment
 from ffr_dyn.scene.forces.places import OnJoint
-from ffr_dyn.scene.forces.spring_law import compiled_spring, spring_force, spring_kinks, spring_slopes, stiff, stored
-from ffr_prep.common.arrays import Array
+from ffr_dyn.scene.forces.spring_law import Spring
 
 
 @register_force
 @dataclass(frozen=True)
-class JointSpring(Force):
+class JointSpring(Spring):
     """-(stiffness (c - free) + damping dc/dt + preload) on a joint coordinate c: a torsion spring, or one along a guide.
 
     joint : name of the joint
@@ -32,10 +30,8 @@ class JointSpring(Force):
     """
 
     word = "joint-spring"
-    kernel = "ffr_dyn.kernels.forces.spring:spring"
     acts = "joint coordinate c: −(k (c − free) + d ċ + preload)"
     positive = "increases c"
-    stores_energy = True
 
     name: str
     joint: str
@@ -57,26 +53,6 @@ class JointSpring(Force):
     def place(self) -> OnJoint:
         return OnJoint(f"force {self.name!r}", self.joint, self.coordinate, self.turns)
 
-    def law(self, now: Moment, c: float, rate: float) -> float:
-        return spring_force(self.stiffness, self.damping, self.preload, c - self.free, rate)
-
     @property
-    def kinks(self) -> tuple[Kink, ...]:
-        return spring_kinks(self.stiffness, self.free)
-
-    @property
-    def damps_unevenly(self) -> bool:
-        return isinstance(self.damping, Curve)
-
-    @property
-    def stiff_coordinates(self) -> tuple[int, ...]:
-        return stiff(self.stiffness, self.damping)
-
-    def slopes(self, now: Moment, c: float, rate: float) -> tuple[float, float]:
-        return spring_slopes(self.stiffness, self.damping, c - self.free, rate)
-
-    def compiled(self, table: LoadTable) -> LawNumbers:
-        return compiled_spring(self.stiffness, self.damping, self.free, self.preload, table)
-
-    def energy(self, c: Array) -> Array:
-        return stored(self.stiffness, self.preload, c - self.free)
+    def slack(self) -> float:
+        return self.free

@@ -92,7 +92,7 @@ class JointStop(Force):
         found: Array = self.stiffness * (entered**3 / (6 * self.entry) + 0.5 * beyond * (beyond + self.entry))
         return found
 
-    @property
+    @cached_property
     def kinks(self) -> tuple[Kink, ...]:
         """Where a stop is met and where it is entered, and where damping would begin to pull, beyond that and before.
 

@@ -10,16 +10,14 @@ from ffr_dyn.functions.curves import Curve
 from ffr_dyn.scene.fields import Curved, In
 from ffr_dyn.scene.force_kinds import register_force
 from ffr_dyn.scene.forces.checks import check_damping, check_number, check_number_or_curve
-from ffr_dyn.scene.forces.force import Force, Kink, LawNumbers, LoadTable, Moment
 from ffr_dyn.scene.forces.places import AlongLine
-from ffr_dyn.scene.forces.spring_law import compiled_spring, spring_force, spring_kinks, spring_slopes, stiff, stored
-from ffr_prep.common.arrays import Array
+from ffr_dyn.scene.forces.spring_law import Spring
 from ffr_prep.common.errors import InputError
 
 
 @register_force
 @dataclass(frozen=True)
-class SpringDamper(Force):
+class SpringDamper(Spring):
     """Force along the line i - j, positive in tension: stiffness (l - free_length) + damping dl/dt + preload.
 
     stiffness : [N/m], or a `Curve` of the force [N] over l - free_length [m]
@@ -36,10 +34,8 @@ class SpringDamper(Force):
 
     table = "springs"
     word = ""
-    kernel = "ffr_dyn.kernels.forces.spring:spring"
     acts = "along the line of two markers: k (l − free_length) + d l̇ + preload"
     positive = "tension"
-    stores_energy = True
 
     name: str
     i: str
@@ -62,26 +58,6 @@ class SpringDamper(Force):
     def place(self) -> AlongLine:
         return AlongLine(self.i, self.j)
 
-    def law(self, now: Moment, c: float, rate: float) -> float:
-        return spring_force(self.stiffness, self.damping, self.preload, c - self.free_length, rate)
-
     @property
-    def kinks(self) -> tuple[Kink, ...]:
-        return spring_kinks(self.stiffness, self.free_length)
-
-    @property
-    def damps_unevenly(self) -> bool:
-        return isinstance(self.damping, Curve)
-
-    @property
-    def stiff_coordinates(self) -> tuple[int, ...]:
-        return stiff(self.stiffness, self.damping)
-
-    def slopes(self, now: Moment, c: float, rate: float) -> tuple[float, float]:
-        return spring_slopes(self.stiffness, self.damping, c - self.free_length, rate)
-
-    def compiled(self, table: LoadTable) -> LawNumbers:
-        return compiled_spring(self.stiffness, self.damping, self.free_length, self.preload, table)
-
-    def energy(self, c: Array) -> Array:
-        return stored(self.stiffness, self.preload, c - self.free_length)
+    def slack(self) -> float:
+        return self.free_length

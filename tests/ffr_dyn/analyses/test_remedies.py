@@ -28,7 +28,7 @@ import scene_cases
 import study_cases
 from ffr_gallery.bodies import bar
 from remedy import CLOUD, DOUBLE, DRIVEN, GROUND, HINGED, TURNING, run
-from said import Case, texts_of
+from said import Case, numbered, texts_of
 from synthetic import cloud
 from test_analyses_inverse import flexible_arm
 from test_analyses_kinematic import slider_crank
@@ -969,19 +969,19 @@ INPUT = [
     Case(window, lambda: written(fd.show, HINGED, "a.html")),
     Case(lambda: tabled(None), lambda: tabled(PANDAS)),
 ]
-KINDS = {
-    "runs": RUNS,
-    "input": INPUT,
-    "command": command_cases.CASES,
-    "cost": cost_cases.CASES,
-    "result": result_cases.CASES,
-    "scene": scene_cases.CASES,
-    "analysis": analysis_cases.CASES,
-    "study": study_cases.CASES,
-    "bent": analysis_cases.BENT,
-}
-CASES = tuple(case for cases in KINDS.values() for case in cases)
-NAMES = [f"{kind} {k}" for kind, cases in KINDS.items() for k in range(len(cases))]
+CASES, NAMES = numbered(
+    {
+        "runs": RUNS,
+        "input": INPUT,
+        "command": command_cases.CASES,
+        "cost": cost_cases.CASES,
+        "result": result_cases.CASES,
+        "scene": scene_cases.CASES,
+        "analysis": analysis_cases.CASES,
+        "study": study_cases.CASES,
+        "bent": analysis_cases.BENT,
+    }
+)
 
 
 # ---- the texts ------------------------------------------------------------------------------------------------------------

@@ -15,7 +15,7 @@ import prep_numerics_cases
 import prep_source_cases
 import prep_structure_cases
 import pytest
-from said import texts_of
+from said import numbered, texts_of
 
 from ffr_prep.common.errors import ComputationError, InputError
 
@@ -24,19 +24,19 @@ PARTS: dict[str, tuple[str, ...]] = {
     "common/outputs.py": ("not_written", "_in_use"),
     "common/reading.py": ("not_of_its_ending",),
 }
-KINDS = {
-    "command": prep_command_cases.CASES,
-    "model": prep_model_cases.CASES,
-    "mesh": prep_mesh_cases.CASES,
-    "structure": prep_structure_cases.CASES,
-    "matrix": prep_matrix_cases.CASES,
-    "exchange": prep_exchange_cases.CASES,
-    "source": prep_source_cases.CASES,
-    "numerics": prep_numerics_cases.CASES,
-    "body": prep_body_cases.CASES,
-}
-CASES = tuple(case for cases in KINDS.values() for case in cases)
-NAMES = [f"{kind} {k}" for kind, cases in KINDS.items() for k in range(len(cases))]
+CASES, NAMES = numbered(
+    {
+        "command": prep_command_cases.CASES,
+        "model": prep_model_cases.CASES,
+        "mesh": prep_mesh_cases.CASES,
+        "structure": prep_structure_cases.CASES,
+        "matrix": prep_matrix_cases.CASES,
+        "exchange": prep_exchange_cases.CASES,
+        "source": prep_source_cases.CASES,
+        "numerics": prep_numerics_cases.CASES,
+        "body": prep_body_cases.CASES,
+    }
+)
 
 
 @cache
