@@ -148,7 +148,7 @@ def _explained(error: ValidationError, source: Source, tree: Mapping[str, Any]) 
             continue
         plain = isinstance(item["input"], (str, int, float, bool, list))
         value = f" (it is {item['input']!r})" if plain and item["type"] != "missing" else ""
-        text = _with_nearest(item, complaint(item).removeprefix("it: "))
+        text = _with_nearest(item, where, complaint(item).removeprefix("it: "))
         at = (*where, misspelt[1]) if (misspelt := re.match(r"'(.+?)' is not a known entry", text)) else where
         lines[f"{origin(source, at)}: {'.'.join(where) or 'file'}: {text}{value}"] = None
     return "; ".join(lines)
@@ -171,7 +171,7 @@ def _form(item: Any) -> tuple[tuple[Any, ...], str] | None:
     return None if at is None else (keys[:at], keys[at])
 
 
-def _with_nearest(item: Any, text: str) -> str:
+def _with_nearest(item: Any, where: tuple[str, ...], text: str) -> str:
     """A complaint about a word that is not one of those that are known, with the nearest of them."""
     if item["type"] == "kind" and isinstance(item["input"], dict):
         given, known = item["input"].get("kind"), text.partition("there are ")[2].split(", ")
@@ -179,7 +179,7 @@ def _with_nearest(item: Any, text: str) -> str:
     elif item["type"] == "missing" and item["loc"] == ("analysis",):
         return f"{text}; {_ANALYSIS}"
     elif item["type"] == "dict_type" and isinstance(item["input"], list):
-        return f"must be tables with names; write [{'.'.join(map(str, item['loc']))}.NAME] for each"
+        return f"must be tables with names; write [{'.'.join(where)}.NAME] for each"
     elif item["type"] == "literal_error":
         given, known = item["input"], re.findall(r"'([^']*)'", text)
     else:

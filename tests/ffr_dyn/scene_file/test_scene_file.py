@@ -108,6 +108,13 @@ def test_a_list_of_tables_is_told_to_be_tables_with_names(tmp_path):
         load_scene(written(tmp_path, '[[joints]]\nkind = "revolute"\n'))
 
 
+def test_a_list_of_events_is_told_where_tables_of_events_are(tmp_path):
+    """The keys are those of the file, whatever kind of analysis it is read as."""
+    text = changed("[analysis]\n", '[analysis]\nevents = [{quantity = "rod.q", value = 0}]\n')
+    with pytest.raises(InputError, match=r"must be tables with names; write \[analysis\.events\.NAME\] for each"):
+        load_scene(written(tmp_path, text))
+
+
 def test_what_is_missing_is_said_with_what_to_write(tmp_path):
     with pytest.raises(
         InputError, match=r'analysis: is required, and missing; write a table \[analysis\] with kind = "steady"'
