@@ -51,6 +51,20 @@ class _Elements:
         return 3
 
 
+class _Mapping(skfem.MappingIsoparametric):  # type: ignore[misc]  # scikit-fem has no types
+    """scikit-fem asks for the inverse Jacobian at the same points once for each shape function: one is kept."""
+
+    def __init__(self, elements: _Elements) -> None:
+        super().__init__(elements, elements.elem)
+        self._last: tuple[Array, Array] | None = None
+
+    def invDF(self, X: Array, tind: Array | None = None) -> Array:
+        """(3, 3, E, Q) at the points X (3, Q) of the reference element, of all elements."""
+        if self._last is None or self._last[0] is not X:
+            self._last = X, super().invDF(X)
+        return self._last[1]
+
+
 @cache
 def shape_functions(kind: str) -> skfem.Element:
     """scikit-fem's element of that kind."""
@@ -65,14 +79,14 @@ def local_order(kind: str) -> Array:
 
 def mapping(kind: str, points: Array, nodes: Array) -> skfem.MappingIsoparametric:
     """From the reference element to the elements with these nodes (E, k) of the points (N, 3) [m]."""
-    element = shape_functions(kind)
     theirs = np.ascontiguousarray(nodes.T[np.argsort(local_order(kind))])
-    return skfem.MappingIsoparametric(_Elements(points.T, theirs, element), element)
+    return _Mapping(_Elements(points.T, theirs, shape_functions(kind)))
 
 
 def determinants(geometry: skfem.MappingIsoparametric, X: Array) -> Array:
     """(E, Q) determinants of dx/dX [m^3] at X (3, Q) of the reference element, which scikit-fem refuses to give if 0."""
-    return np.asarray(np.linalg.det(geometry.DF(X).transpose(2, 3, 0, 1)))
+    first, second, third = geometry.DF(X)
+    return np.asarray(np.sum(first * np.cross(second, third, axis=0), axis=0))
 
 
 def scalar_basis(geometry: skfem.MappingIsoparametric, quadrature: tuple[Array, Array]) -> skfem.CellBasis:

@@ -31,7 +31,7 @@ check_compiled_code()
 
 Materials = Solid | Mapping[str, Solid]
 
-_CHUNK = 2048
+_CHUNK = 4096
 
 # Orders of the quadrature rules. The stiffness is integrated in full (exactly on straight tetrahedra); the mass exactly
 # for every shape the element can take: its integrand is N_a N_b det J.

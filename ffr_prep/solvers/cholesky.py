@@ -44,7 +44,7 @@ from ffr_prep.solvers.multifrontal import (
     update_tile,
 )
 from ffr_prep.solvers.nested_dissection import NOTHING, elimination_tree
-from ffr_prep.solvers.substitution import LeafRows, backward, forward, leaf_rows
+from ffr_prep.solvers.substitution import SIDES, LeafRows, backward, forward, leaf_rows
 from ffr_prep.solvers.threads import Map, finish, pieces, threads
 
 _BRANCHES = 24  # a branch has at most this part of the work
@@ -132,14 +132,15 @@ def cholesky(A: sp.csr_array, positions: Array, advance: Advance = no_advance, h
 
 def solve_cholesky(factor: Factor, b: Array) -> Array:
     """A^-1 b for b (n, r)."""
-    n, order = len(factor.order), factor.order
-    y, x = np.empty((factor.rows, b.shape[1])), np.zeros(b.shape)
+    n, order, sides = len(factor.order), factor.order, b.shape[1]
+    y, x = np.empty((factor.rows, -(-sides // SIDES) * SIDES)), np.zeros(b.shape)
 
     def begin(part: slice) -> None:
-        np.take(b, order[part], axis=0, out=y[part], mode="clip")  # which needs no copy
+        y[part, :sides] = b[order[part]]
+        y[part, sides:] = 0.0
 
     def end(part: slice) -> None:
-        x[order[part]] = y[part]
+        x[order[part]] = y[part, :sides]
 
     with threads() as each:
         finish(each(begin, pieces(n)))

@@ -102,32 +102,40 @@ def _orthonormal(vectors: Array, Q: SearchSpace, M: sp.csr_array, last: list[Arr
         _take_out(vectors, Q, rounding, each, 0)
         coordinates += rounding
         size = np.sum(coordinates**2, axis=0) + np.einsum("zi,zi->i", vectors, momenta)
-        vectors, momenta, amplified = _normalised(vectors, momenta, _DEPENDENT**2 * size.max(initial=0.0))
+        vectors, momenta, amplified = _normalised(vectors, momenta, _DEPENDENT**2 * size.max(initial=0.0), each)
         if amplified:
             _take_out(vectors, Q, _coordinates(Q, sparse_product(M, vectors, each, momenta), each), each, 0)
-        vectors, momenta, _ = _normalised(vectors, sparse_product(M, vectors, each, momenta), 0.5)
+        vectors, momenta, _ = _normalised(vectors, sparse_product(M, vectors, each, momenta), 0.5, each)
     return vectors, momenta, coordinates
 
 
-def _normalised(vectors: Array, momenta: Array, smallest: float) -> tuple[Array, Array, bool]:
+def _normalised(vectors: Array, momenta: Array, smallest: float, each: Map) -> tuple[Array, Array, bool]:
     """M-orthonormal basis of the vectors without directions of a smaller squared norm, M times it, and whether some are so
     small that their rounding is large.
 
     momenta : M times the vectors; what these were freed of since does no harm, as they have no more of it. Both are
               overwritten: fresh memory takes longer than filling it.
     """
-    squares, axes = scipy.linalg.eigh(vectors.T @ momenta)
+    squares, axes = scipy.linalg.eigh(_summed(lambda part: vectors[part].T @ momenta[part], vectors, each))
     kept = squares > smallest
     combination = axes[:, kept] / np.sqrt(squares[kept])
     amplified = bool((squares[kept] < _AMPLIFIED**2 * squares.max(initial=0.0)).any())
-    return _turned(vectors, combination), _turned(momenta, combination), amplified
+    return _turned(vectors, combination, each), _turned(momenta, combination, each), amplified
 
 
-def _turned(vectors: Array, combination: Array) -> Array:
+def _turned(vectors: Array, combination: Array, each: Map) -> Array:
     """(Z, k) vectors (Z, b) times a combination (b, k), in their memory if k = b."""
-    for part in pieces(len(vectors)):
+
+    def turn(part: slice) -> None:
         vectors[part, : combination.shape[1]] = vectors[part] @ combination
+
+    finish(each(turn, pieces(len(vectors))))
     return np.ascontiguousarray(vectors[:, : combination.shape[1]])
+
+
+def _summed(product: Callable[[slice], Array], rows: Array, each: Map) -> Array:
+    """The sum of products that are made of pieces of long arrays with so many rows."""
+    return np.asarray(np.sum(list(each(product, pieces(len(rows)))), axis=0))
 
 
 # ---- the search space: rows of panels, which make large products of matrices --------------------------------------
@@ -164,7 +172,7 @@ def _coordinates(Q: SearchSpace, momenta: Array, each: Map) -> Array:
     def of_rows(part: slice) -> Array:
         return np.vstack([np.zeros((0, momenta.shape[1])), *(rows[:, part] @ momenta[part] for _, rows in Q.used())])
 
-    return np.sum(list(each(of_rows, pieces(len(momenta)))), axis=0)
+    return _summed(of_rows, momenta, each)
 
 
 def _take_out(vectors: Array, Q: SearchSpace, coordinates: Array, each: Map, first: int) -> None:

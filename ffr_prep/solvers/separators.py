@@ -35,7 +35,7 @@ def separated(
     below, above = ordered[:low], ordered[high:]
     place[below], place[above] = _BELOW, _ABOVE
     touching = below[_touching(indptr, indices, below, place)]
-    band = np.sort(np.concatenate([touching, ordered[low:high]]))
+    band = np.concatenate([touching, ordered[low:high]])
     place[band] = np.arange(band.size)
     start, stop, steps, back = _reached(indptr, indices, band, place, touching)
     below = below[place[below] == _BELOW]
@@ -51,7 +51,7 @@ def _parts(this: Array, band: Array, other: Array, start: Array, steps: Array) -
     return (
         np.sort(np.concatenate([this, band[own]])),
         np.sort(np.concatenate([other, band[~own & ~separator]])),
-        band[separator],
+        np.sort(band[separator]),
     )
 
 

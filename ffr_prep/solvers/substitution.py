@@ -17,6 +17,7 @@ from ffr_prep.solvers.multifrontal import LEFT, PLAIN, STRIP, TRANSPOSED, divide
 
 check_compiled_code()
 
+SIDES = 4  # right-hand sides at a time; a solution has a multiple of them
 _FEW = 16  # right-hand sides; BLAS is faster for more
 _COLUMNS = 4  # of the factor at a time
 _ROWS = 512  # of these columns at a time: 16 kB
@@ -27,13 +28,12 @@ class LeafRows(NamedTuple):
     """The rows A_21 of the matrix at the boundary of every leaf, by own unknowns.
 
     ends    : (n + 1,) where the entries of each unknown are, none but those of leaves
-    targets : (e,) rows of a solution; entries (e,) : where their numbers are in `data`, which is that of the matrix
+    targets : (e,) rows of a solution; values (e,) : the numbers of the matrix for them
     """
 
     ends: Array
     targets: Array
-    entries: Array
-    data: Array
+    values: Array
 
 
 @numba.njit(cache=True)
@@ -46,7 +46,7 @@ def leaf_rows(fronts, targets, A):  # type: ignore[no-untyped-def]
             for e in range(A.indptr[row], A.indptr[row + 1]):
                 ends[p + 1] += A.place[A.indices[e]] >= fronts.starts[k + 1]
     ends = np.cumsum(ends)
-    rows, entries = np.empty(ends[-1], np.int32), np.empty(ends[-1], A.indptr.dtype)
+    rows, values = np.empty(ends[-1], np.int32), np.empty(ends[-1])
     for k in np.flatnonzero(fronts.children == 0):
         here = slice(fronts.ends[k], fronts.ends[k + 1])
         at[fronts.boundary[here]] = targets[here]
@@ -55,9 +55,9 @@ def leaf_rows(fronts, targets, A):  # type: ignore[no-untyped-def]
             for e in range(A.indptr[row], A.indptr[row + 1]):
                 place = A.place[A.indices[e]]
                 if place >= fronts.starts[k + 1]:
-                    rows[i], entries[i] = at[place], e
+                    rows[i], values[i] = at[place], A.data[e]
                     i += 1
-    return ends, rows, entries, A.data
+    return ends, rows, values
 
 
 @numba.njit(cache=True, nogil=True)
@@ -92,21 +92,30 @@ def _begun(fronts, k, y, space):  # type: ignore[no-untyped-def]
 def _take_from_boundary(leaves, start, own, y):  # type: ignore[no-untyped-def]
     """A_21 times the own part (own, r) of a leaf, taken from the rows y of its boundary."""
     for i in range(len(own)):
-        for e in range(leaves.ends[start + i], leaves.ends[start + i + 1]):
-            target, value = leaves.targets[e], leaves.data[leaves.entries[e]]
-            for c in range(y.shape[1]):
-                y[target, c] -= value * own[i, c]
+        for c in range(0, y.shape[1], SIDES):
+            p, q, r, s = own[i, c], own[i, c + 1], own[i, c + 2], own[i, c + 3]
+            for e in range(leaves.ends[start + i], leaves.ends[start + i + 1]):
+                row, value = y[leaves.targets[e]], leaves.values[e]
+                row[c] -= value * p
+                row[c + 1] -= value * q
+                row[c + 2] -= value * r
+                row[c + 3] -= value * s
 
 
 @numba.njit(cache=True, nogil=True)
 def _boundary_on_own(leaves, start, stop, y):  # type: ignore[no-untyped-def]
     """(own, r) A_21^T y of a leaf, y at the rows of its boundary."""
-    own = np.zeros((stop - start, y.shape[1]))
+    own = np.empty((stop - start, y.shape[1]))
     for i in range(stop - start):
-        for e in range(leaves.ends[start + i], leaves.ends[start + i + 1]):
-            target, value = leaves.targets[e], leaves.data[leaves.entries[e]]
-            for c in range(y.shape[1]):
-                own[i, c] += value * y[target, c]
+        for c in range(0, y.shape[1], SIDES):
+            p = q = r = s = 0.0
+            for e in range(leaves.ends[start + i], leaves.ends[start + i + 1]):
+                row, value = y[leaves.targets[e]], leaves.values[e]
+                p += value * row[c]
+                q += value * row[c + 1]
+                r += value * row[c + 2]
+                s += value * row[c + 3]
+            own[i, c], own[i, c + 1], own[i, c + 2], own[i, c + 3] = p, q, r, s
     return own
 
 

@@ -111,10 +111,21 @@ def product_of_sizes(A: sp.sparray, X: Array) -> Array:
 
 @numba.njit(cache=True, nogil=True)
 def _multiply(indptr, indices, data, X, out, first, last):  # type: ignore[no-untyped-def]
+    """Rows first...last of a product, four columns at a time, the sums of which stay in registers."""
+    whole = X.shape[1] - X.shape[1] % 4
     for i in range(first, last):
         row = out[i]
-        row[:] = 0.0
-        for k in range(indptr[i], indptr[i + 1]):
-            value, other = data[k], X[indices[k]]
-            for j in range(row.size):
-                row[j] += value * other[j]
+        for j in range(0, whole, 4):
+            p = q = r = s = 0.0
+            for k in range(indptr[i], indptr[i + 1]):
+                value, other = data[k], X[indices[k]]
+                p += value * other[j]
+                q += value * other[j + 1]
+                r += value * other[j + 2]
+                s += value * other[j + 3]
+            row[j], row[j + 1], row[j + 2], row[j + 3] = p, q, r, s
+        for j in range(whole, row.size):
+            p = 0.0
+            for k in range(indptr[i], indptr[i + 1]):
+                p += data[k] * X[indices[k], j]
+            row[j] = p
