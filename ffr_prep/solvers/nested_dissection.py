@@ -15,7 +15,7 @@ import scipy.sparse as sp
 
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.compile_cache import check_compiled_code
-from ffr_prep.solvers.separators import separated
+from ffr_prep.solvers.separators import narrowest, separated
 from ffr_prep.solvers.threads import threads
 
 check_compiled_code()
@@ -25,6 +25,8 @@ Tree = tuple[list[Array], list[list[int]]]
 NOTHING = np.zeros(0, int)
 _LEAF = 48  # of larger leaves the factor is larger, of smaller ones too: more fronts are no leaves
 _LEAST = 0.2  # of a part on either side of a cut
+_LARGE = 20_000  # points of a part from which on a cut is looked for near the narrowest place alone
+_NEAR = 0.15  # of the part on either side of that place: as good a cut in half the time
 
 
 def elimination_tree(A: sp.csr_array, positions: Array, held: Array = NOTHING) -> Tree:
@@ -132,7 +134,11 @@ def _cut(points: Array, graph: sp.csr_array, part: Array, place: Array) -> tuple
     _, axes = np.linalg.eigh(offsets.T @ offsets)
     along = part[np.argsort(offsets @ axes[:, -1], kind="stable")]
     low = max(int(_LEAST * part.size), 1)
-    return separated(graph.indptr, graph.indices, along, low, part.size - low, place)
+    high = part.size - low
+    if part.size > _LARGE:
+        narrow, near = narrowest(graph.indptr, graph.indices, along, low, high, place), int(_NEAR * part.size)
+        low, high = max(low, narrow - near), min(high, narrow + near)
+    return separated(graph.indptr, graph.indices, along, low, high, place)
 
 
 def _tops(children: list[list[int]]) -> list[int]:

@@ -44,6 +44,29 @@ def separated(
     return min(first, (other[1], other[0], other[2]), key=lambda parts: abs(len(parts[0]) - len(parts[1])))
 
 
+@numba.njit(cache=True, nogil=True)
+def narrowest(indptr, indices, ordered, low, high, place):  # type: ignore[no-untyped-def]
+    """How many of the points `ordered` come before the cut low...high that fewest points before touch points behind, of equal
+    ones the one nearest to the middle; the other arguments as of `separated`."""
+    size = ordered.size
+    place[ordered] = np.arange(size)
+    change = np.zeros(size + 1, np.int64)
+    for i in range(size):
+        last = i
+        for e in range(indptr[ordered[i]], indptr[ordered[i] + 1]):
+            last = max(last, place[indices[e]])
+        change[i + 1] += 1  # touches points behind every cut from here on
+        change[last + 1] -= 1  # to the last point that it touches
+    place[ordered] = _NONE
+    touching = np.cumsum(change)
+    best = low
+    for cut in range(low, high + 1):
+        fewer = touching[cut] < touching[best]
+        if fewer or (touching[cut] == touching[best] and abs(2 * cut - size) < abs(2 * best - size)):
+            best = cut
+    return best
+
+
 def _parts(this: Array, band: Array, other: Array, start: Array, steps: Array) -> tuple[Array, Array, Array]:
     """The parts on this side and on the other, and the separator, of what a residual graph reaches from this side."""
     own = steps[:, _OUT] >= 0

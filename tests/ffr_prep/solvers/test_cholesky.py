@@ -11,7 +11,7 @@ from scipy.sparse.csgraph import maximum_flow
 from ffr_prep.solids.assembly import assemble
 from ffr_prep.solvers.cholesky import cholesky, solve_cholesky
 from ffr_prep.solvers.nested_dissection import _cut, elimination_tree
-from ffr_prep.solvers.separators import separated
+from ffr_prep.solvers.separators import narrowest, separated
 
 
 def assert_solves(A, positions, columns=3, rel=1e-9):
@@ -184,6 +184,37 @@ def test_no_separator_is_smaller(near):
     touching = ordered[:40][graph[ordered[:40]][:, ordered[110:]].sum(axis=1) > 0]
     fixed = np.setdiff1d(ordered[:40], touching)
     assert len(separator) == _largest_flow(graph, fixed, touching, ordered[110:])
+
+
+@pytest.mark.parametrize("near", [0.1, 0.3, 2.0])
+def test_the_narrowest_place_is_where_fewest_points_touch_points_behind(near):
+    rng = np.random.default_rng(int(10 * near))
+    points = rng.random((150, 3)) * [2.0, 1.0, 0.2]
+    distances = np.linalg.norm(points[:, None] - points, axis=2)
+    ordered, place = np.argsort(points[:, 0]), np.full(150, -1)
+    touches = (distances < near)[np.ix_(ordered, ordered)] & ~np.eye(150, dtype=bool)
+    graph = sp.csr_array((distances < near) & ~np.eye(150, dtype=bool))
+    counts = [int(touches[:cut, cut:].any(axis=1).sum()) for cut in range(151)]
+    found = narrowest(graph.indptr, graph.indices, ordered, 30, 120, place)
+    best = min(range(30, 121), key=lambda cut: (counts[cut], abs(2 * cut - 150)))
+    assert (counts[found], abs(2 * found - 150)) == (counts[best], abs(2 * best - 150))
+    assert (place == -1).all()
+
+
+def test_large_parts_are_cut_at_their_necks_and_others_as_they_were(monkeypatch):
+    """A bar of 4 x 4 points with a neck of 2 x 2 at three tenths of its length: the cut lies in the neck either way."""
+    length, neck = 60, slice(16, 20)
+    inside = np.ones((length, 4, 4), bool)
+    inside[neck] = False
+    inside[neck, :2, :2] = True
+    points = np.argwhere(inside).astype(float)
+    distances = np.abs(points[:, None] - points).max(axis=2)
+    graph = sp.csr_array((distances < 1.5) & (distances > 0))
+    for large in (20_000, 100):
+        monkeypatch.setattr("ffr_prep.solvers.nested_dissection._LARGE", large)
+        separator = _cut(points, graph, np.arange(len(points)), np.full(len(points), -1))[2]
+        assert len(separator) == 4
+        assert set(points[separator, 0]) <= {16.0, 17.0, 18.0, 19.0}
 
 
 def _largest_flow(graph, below, touching, above):
