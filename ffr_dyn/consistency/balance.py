@@ -23,7 +23,6 @@ from ffr_dyn.kernels.tables import SINCE, Record
 from ffr_dyn.results.power import measured_values
 from ffr_dyn.results.recorded_motion import View
 from ffr_dyn.scene.force_kinds import forces_of
-from ffr_dyn.scene.forces import JointStop
 from ffr_dyn.scene.forces.force import Force
 from ffr_dyn.scene.forces.places import COORDINATE, FORCE, RATE, AlongLine, OnJoint
 from ffr_prep.common.arrays import Array
@@ -118,7 +117,7 @@ def _beside_stops(account: Account, rows: Record, steps: Array) -> Array:
     for row, (k, stop) in enumerate(_stops(system)):
         c, rate = measured_values(view, k, COORDINATE), measured_values(view, k, RATE)
         _note_missed(account, row, rows, (c, rate, measured_values(view, k, FORCE)), steps)
-        if not isinstance(stop, JointStop):
+        if not stop.throws_back:
             continue
         reach = REACHED * steps * np.abs(rate)
         near = stop.energy(c - reach) + stop.energy(c + reach) > 0
@@ -198,26 +197,14 @@ def lost_rebounds(account: Account, step: float) -> list[str]:
 
 def _meeting(account: Account, row: int) -> tuple[float, float]:
     """How long stop number `row` is met [s], and the energy [J] that comes back, by the mass that moves with it as bodies do
-    that do not bend: half a vibration, as deep as the energy of the approach goes, which damping of a ratio zeta leaves
-    exp(-2 pi zeta / sqrt(1 - zeta^2)) of."""
+    that do not bend."""
     (time, rate), stop = account.stops["met"][row], _stops(account.system)[row][1]
-    if not (rate > 0 and isinstance(stop, JointStop)):
+    if not (rate > 0 and stop.throws_back):
         return np.inf, 0.0
-    m, k = _mass_before(account.system, stop, float(time), account.stops["met.x"][row]), stop.stiffness
-    energy = 0.5 * m * rate**2
-    if not energy < np.inf:
-        return np.inf, 0.0
-    soft = k * stop.entry**2 / 6  # stored where the full stiffness begins
-    if energy < soft:
-        depth = (6 * stop.entry * energy / k) ** (1 / 3)
-    else:
-        depth = 0.5 * (stop.entry + np.sqrt(stop.entry**2 + 8 * (energy - soft) / k))
-    ratio = 0.5 * stop.damping / np.sqrt(k * m)
-    returned = energy * np.exp(-2 * np.pi * ratio / np.sqrt(1 - ratio**2)) if ratio < 1 else 0.0
-    return float(np.pi * depth / rate), float(returned)
+    return stop.rebound(_mass_before(account.system, stop, float(time), account.stops["met.x"][row]), rate)
 
 
-def _mass_before(system: System, stop: JointStop, time: float, x: Array) -> float:
+def _mass_before(system: System, stop: Force, time: float, x: Array) -> float:
     """[kg], [kg m^2] what moves with the joint coordinate of a stop; infinite where only bending moves it, and in a position
     that has no accelerations."""
     scene, place = system.scene, system.layout
@@ -241,7 +228,7 @@ def amiss(account: Account, method: str, remedy: str) -> list[str]:
     least = QUIET * sum(body.model.mass for body in scene.bodies)
     if not abs(worst) > max(AMISS * most, least) or (account.system.model.base >= 0).any():
         return []
-    if any(isinstance(force, JointStop) and not _conserves(force) for force in forces_of(scene)):
+    if any(force.throws_back and not _conserves(force) for force in forces_of(scene)):
         return []  # an impact that takes energy may fall between two rows
     way = (
         "has come that no force or driver has put in" if worst > 0 else "has gone that no force or driver has taken out"

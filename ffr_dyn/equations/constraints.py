@@ -182,7 +182,7 @@ WORDS: dict[str, Callable[[Markers, Word, tuple[int, ...], Drive], Row]] = {
 
 
 def coordinate(now: Markers, kind: str, axes: Sequence[Array] | Array, at: Sequence[int]) -> Row:
-    """Value, rate and bias of a joint coordinate, an "angle" or a "stroke", as a row; axes: f_i, g_i, f_j, or h_i.
+    """Value, rate and gamma of a joint coordinate, an "angle" or a "stroke", as a row; axes: f_i, g_i, f_j, or h_i.
 
     Equation (21) of docs/notation.md.
     """

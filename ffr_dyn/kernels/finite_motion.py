@@ -1,6 +1,6 @@
 """Finite motions of all bodies: rotations by rotation vectors, and how large a motion is.
 
-Twin: `ffr_dyn.consistency.evaluation.moved`.
+Twin: `ffr_dyn.equations.layout.moved`.
 """
 
 import math

@@ -175,7 +175,7 @@ def axis_motion(w, k, a0):
 
 @kernel
 def on_shapes(w, k, moment):
-    """Add the generalised force of a moment (body axes) on marker k along its rotation vector."""
+    """The generalised force of a moment (body axes) on marker k along its rotation vector."""
     return to_body(w.T[k], moment)
 
 

@@ -128,13 +128,13 @@ def fill_relation(axes, relation, drive, markers, at, w, row, first_side, lane):
     Phi, nu, gamma = -drive[0], -drive[1], drive[2]
     for k in range(2):
         factor, first = relation[2 * k], 3 * k
-        value, rate, bias, side_i, side_j = coordinate(
+        value, rate, of_coordinate, side_i, side_j = coordinate(
             int(relation[2 * k + 1]), get(axes, first), get(axes, first + 1), get(axes, first + 2),
             markers, at[2 * k], at[2 * k + 1],
         )  # fmt: skip
         Phi += factor * value
         nu += factor * rate
-        gamma += factor * bias
+        gamma += factor * of_coordinate
         fill_side(w.jac[first_side + 2 * k], lane, factor, side_i)
         fill_side(w.jac[first_side + 2 * k + 1], lane, factor, side_j)
     if relation[4] > 0.0:

@@ -1,8 +1,8 @@
 """One evaluation of the equations of motion of a scene; everything an integrator or an analysis calls.
 
 Order of calls: `prepare` once per elastic diagonal; `factorise_bodies`, `update_markers`, the loads, the constraint rows,
-`evaluate_joints` at a state; then any number of solutions (`ffr_dyn.kernels.solution`) with its factors. Called from
-`ffr_dyn.kernels.entry_points` alone.
+`evaluate_joints` at a state; then any number of solutions (`ffr_dyn.kernels.solution`) with its factors. Evaluations are
+called from `ffr_dyn.kernels.entry_points` alone.
 
 Twin: `ffr_dyn.equations.motion.equations_of_motion`.
 """

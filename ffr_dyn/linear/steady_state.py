@@ -41,7 +41,6 @@ from ffr_dyn.functions.rotation import from_vector, product, rotation_matrix, sk
 from ffr_dyn.linear.hill import harmonics
 from ffr_dyn.linear.turning_on import turning_on
 from ffr_dyn.scene.force_kinds import forces_of
-from ffr_dyn.scene.forces.bushing import Bushing
 from ffr_dyn.scene.forces.force import Force
 from ffr_dyn.scene.forces.places import AtMarker, OnBody
 from ffr_dyn.scene.scene import markers
@@ -405,11 +404,7 @@ def _phases(machine: Machine) -> tuple[float, ...]:
 def _turned_on(machine: Machine, x: Array) -> tuple[str, ...]:
     """Notes on bushings whose ends turn against each other for good, and that are stiff against rotation."""
     now = At(machine.system.scene, machine.place, machine.time, x, velocities(machine.place, machine.screws, x))
-    stiff = [
-        force
-        for force in forces_of(now.scene)
-        if isinstance(force, Bushing) and (force.stiffness_matrix[3:].any() or any(force.curves[3:]))
-    ]
+    stiff = [force for force in forces_of(now.scene) if force.holds_turning]
     against = [np.linalg.norm(np.diff(_ends(machine.screws, now, force)[1], axis=0)) for force in stiff]
     return tuple(
         f"bushing {force.name!r} is turned on and on, and its moments are for less than half a turn: they are no bearing's. "

@@ -186,6 +186,30 @@ def test_the_dynamics_see_the_preparation_through_the_door_only():
     assert "ffr_dyn.scene.scene" in intruders("ffr_dyn", foreign="ffr_prep", allowed=set())
 
 
+def asked_kinds(source: str, kinds: set[str]) -> set[str]:
+    """The kinds that `isinstance` is called with."""
+    found = set()
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "isinstance":
+            found |= {getattr(n, "id", getattr(n, "attr", "")) for n in ast.walk(node.args[1])} & kinds
+    return found
+
+
+def test_forces_are_asked_what_they_do_and_not_of_which_kind_they_are():
+    """What depends on the kind of a force stands in its own file (`ffr_dyn.scene.forces.force`)."""
+    from ffr_dyn.scene.force_kinds import FORCES
+
+    kinds = {kind.__name__ for kind in FORCES}
+    assert {"JointStop", "Bushing", "Load"} <= kinds
+    assert asked_kinds("isinstance(f, JointStop | fd.Load) and isinstance(g, (int, Bushing))", kinds) == {
+        "JointStop",
+        "Load",
+        "Bushing",
+    }
+    sources = {m: MODULES[m].read_text(encoding="utf-8") for m in modules_of("ffr_dyn") if "scene.forces" not in m}
+    assert {m: asked for m, source in sources.items() if (asked := asked_kinds(source, kinds))} == {}
+
+
 def test_the_preparation_knows_nothing_of_the_dynamics():
     assert intruders("ffr_prep", foreign="ffr_dyn", allowed=set()) == {}
 

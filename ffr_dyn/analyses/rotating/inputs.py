@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from ffr_dyn.analyses.efforts import Effort, JointEffort, MarkerEffort, with_function
 from ffr_dyn.analyses.linearise import BASE
 from ffr_dyn.analyses.states import scene_at
-from ffr_dyn.functions.operations import ADD, MULTIPLY
+from ffr_dyn.functions.operations import ADD
 from ffr_dyn.functions.time_functions import TimeFunction, as_time_function, is_zero, operation
 from ffr_dyn.scene.drivers import Driver
 from ffr_dyn.scene.joints import COORDINATES, Joint
@@ -181,22 +181,6 @@ def excited(scene: Scene, given: Acting, wave: TimeFunction) -> Scene:
         k = BASE[given.effort]
         base[k] = wave if is_zero(base[k]) else operation(ADD, base[k], wave)
         return replace(scene, base_acceleration=tuple(base))
-    changed = tuple(_with_share(load, wave) if load.name == given.effort else load for load in scene.loads)
-    return replace(scene, loads=changed)
-
-
-def _with_share(load: object, wave: TimeFunction) -> object:
-    from ffr_dyn.scene.forces import Load
-
-    if not isinstance(load, Load) or load.function is not None:
-        raise InputError(f"input {getattr(load, 'name', load)!r}: only a force and a moment on a marker can be varied")
-    if all(is_zero(as_time_function(f, load.name)) for f in (*load.force, *load.moment)):
-        raise InputError(
-            f"input {load.name!r}: the load is zero, and so is every share of it; give it a force or a moment"
-        )
     share = operation(ADD, as_time_function(1.0, "share"), wave)
-    varied = [
-        tuple(operation(MULTIPLY, as_time_function(f, load.name), share) for f in of)
-        for of in (load.force, load.moment)
-    ]
-    return replace(load, force=varied[0], moment=varied[1])
+    changed = tuple(load.varied(share) if load.name == given.effort else load for load in scene.loads)
+    return replace(scene, loads=changed)

@@ -49,7 +49,7 @@ def leap_of(method: Integrator) -> int:
 
 @dataclass(frozen=True)
 class Trial:
-    """A run and what tells its error; no errors where the runs that would tell them failed."""
+    """A run and what tells its error; no errors where nobody asked or the runs that would tell them failed."""
 
     method: Integrator
     count: int  # steps to an output row

@@ -96,6 +96,10 @@ class Bushing(Force):
         """The curve of each of the six directions, None where the stiffness is a number."""
         return [k if isinstance(k, Curve) else None for k in self.stiffness]
 
+    @property
+    def holds_turning(self) -> bool:
+        return bool(self.stiffness_matrix[3:].any() or any(self.curves[3:]))
+
     def _six_by_six(self, value: Any, what: str) -> Array:
         array = check_array(value, (6, 6) if np.ndim(value) == 2 else (6,), f"bushing {self.name!r}: {what}")
         return array if array.ndim == 2 else np.diag(array)

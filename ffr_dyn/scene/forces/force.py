@@ -14,10 +14,12 @@ from typing import Any, ClassVar, NamedTuple, Protocol
 
 import numpy as np
 
+from ffr_dyn.functions.time_functions import TimeFunction
 from ffr_dyn.scene.forces.places import Place
 from ffr_dyn.scene.scene import Scene
 from ffr_prep.body import FlexibleBody
 from ffr_prep.common.arrays import Array
+from ffr_prep.common.errors import InputError
 
 
 class Moment(Protocol):
@@ -73,6 +75,7 @@ class Force(ABC):
     acts, positive : what it is and which way it counts, for the table in docs/forces.md
     stores_energy  : it has an `energy`
     sudden         : the motion may change it by all of itself within a step, as where a stop is met
+    throws_back    : bodies come to it and leave it again, and it has a `rebound`
     given    : how many components are given from outside, so that analyses can size them, 0 where the state makes the force;
                the numbers of its law begin with a factor for each, then their functions of time or -1
 
@@ -87,6 +90,7 @@ class Force(ABC):
     positive: ClassVar[str]
     stores_energy: ClassVar[bool] = False
     sudden: ClassVar[bool] = False
+    throws_back: ClassVar[bool] = False
     given: ClassVar[int] = 0
 
     @property
@@ -132,6 +136,20 @@ class Force(ABC):
     def energy(self, c: Array) -> Array:
         """(T,) [J] stored at recorded coordinates (T,) or (T, 6)."""
         return np.zeros(len(c))
+
+    def rebound(self, mass: float, rate: float) -> tuple[float, float]:
+        """How long [s] a mass that comes along its coordinate at this rate is in touch with it, and the energy [J] with
+        which it leaves."""
+        return np.inf, 0.0
+
+    @property
+    def holds_turning(self) -> bool:
+        """Whether it is stiff against the turning of its markers against each other, for less than half a turn."""
+        return False
+
+    def varied(self, share: TimeFunction) -> Force:
+        """The same times a function of time. Raises InputError for a force that is not given."""
+        raise InputError(f"input {self.name!r}: only a force and a moment on a marker can be varied")
 
     def check(self, scene: Scene) -> None:
         """InputError when the scene has not what the force needs."""

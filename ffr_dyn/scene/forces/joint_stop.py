@@ -43,6 +43,7 @@ class JointStop(Force):
     positive = "increases c"
     stores_energy = True
     sudden = True
+    throws_back = True
 
     name: str
     joint: str
@@ -85,6 +86,21 @@ class JointStop(Force):
     def energy(self, c: Array) -> Array:
         below = np.zeros(len(c)) if self.lower is None else self._stored(self.lower - c)
         return below if self.upper is None else below + self._stored(c - self.upper)
+
+    def rebound(self, mass: float, rate: float) -> tuple[float, float]:
+        """Half a vibration, as deep as the energy of the approach goes, which damping of a ratio zeta leaves
+        exp(-2 pi zeta / sqrt(1 - zeta^2)) of."""
+        k, energy = self.stiffness, 0.5 * mass * rate**2
+        if not energy < np.inf:
+            return np.inf, 0.0
+        soft = k * self.entry**2 / 6  # stored where the full stiffness begins
+        if energy < soft:
+            depth = (6 * self.entry * energy / k) ** (1 / 3)
+        else:
+            depth = 0.5 * (self.entry + np.sqrt(self.entry**2 + 8 * (energy - soft) / k))
+        ratio = 0.5 * self.damping / np.sqrt(k * mass)
+        returned = energy * np.exp(-2 * np.pi * ratio / np.sqrt(1 - ratio**2)) if ratio < 1 else 0.0
+        return float(np.pi * depth / rate), float(returned)
 
     def _stored(self, depth: Array) -> Array:
         entered = np.clip(depth, 0.0, self.entry)

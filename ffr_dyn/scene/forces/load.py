@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sized
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Annotated, Any
 
 import numpy as np
 
+from ffr_dyn.functions.operations import MULTIPLY
+from ffr_dyn.functions.time_functions import TimeFunction, as_time_function, is_zero, operation
 from ffr_dyn.scene.fields import OfMotion, Three
 from ffr_dyn.scene.force_kinds import register_force
 from ffr_dyn.scene.forces.force import Force, LawNumbers, LoadTable, Moment
@@ -76,6 +78,18 @@ class Load(Force):
             given = np.ravel(self.function(now.t, now.state))
             values[: given.size] += given
         return values
+
+    def varied(self, share: TimeFunction) -> Load:
+        """Force and moment times a function of time."""
+        if self.function is not None:
+            super().varied(share)
+        given = [as_time_function(component, self.name) for component in (*self.force, *self.moment)]
+        if all(is_zero(component) for component in given):
+            raise InputError(
+                f"input {self.name!r}: the load is zero, and so is every share of it; give it a force or a moment"
+            )
+        varied = [operation(MULTIPLY, component, share) for component in given]
+        return replace(self, force=varied[:3], moment=varied[3:])
 
     def compiled(self, table: LoadTable) -> LawNumbers:
         numbers = given_numbers((*self.force, *self.moment), f"load {self.name!r}", table)
