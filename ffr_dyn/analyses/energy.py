@@ -263,7 +263,7 @@ def _powers(view: View) -> Array:
     """(T, sources) of all forces and drivers."""
     scene = view.system.scene
     drives = [*scene.drivers, *(joint for joint in scene.joints if joint.kind == "distance")]
-    return np.column_stack([view.record.power, *(power(view, drive) for drive in drives)])
+    return np.concatenate([view.record.power, *(power(view, drive)[:, None] for drive in drives)], axis=1)
 
 
 def _finer(method: Integrator, step: float) -> Any:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
@@ -232,8 +233,11 @@ def _check_stabilisation(method: Integrator, stabilisation: Stabilisation) -> No
 
 def _check_step(scene: Scene, method: Integrator) -> None:
     """Refuse an explicit step that cannot be stable for any state."""
-    fastest = max(scene.bodies, key=lambda body: body.model.omega2.max(initial=0.0))
-    omega = float(np.sqrt(fastest.model.omega2.max(initial=0.0)))
+    flexible = [(float(body.model.omega2.max(initial=0.0)), body) for body in scene.bodies if body.model.n]
+    if not flexible:
+        return
+    omega2, fastest = max(flexible, key=lambda one: one[0])
+    omega = math.sqrt(omega2)
     if method.step * omega > method.reach:
         raise InputError(
             f"{type(method).__name__} with a step of {method.step:g} s is unstable: body {fastest.name!r} has a mode of "
@@ -317,13 +321,14 @@ def _advance(
         chunk = new_record(system, looks * min(count, rows - run.done // substeps))
         with watch:
             status = fill_rows(run.engine, chunk, start, substeps // looks)
-        filled = int(steps[FILLED]) - int(steps[FILLED]) % looks
-        reached_rows = Record(*(column[: steps[FILLED]] for column in chunk))
+        ready = int(steps[FILLED])
+        filled = ready - ready % looks
+        reached_rows = _first(chunk, ready)
         lost = None if method.controlled else unfollowed(run.engine.system, run.engine.work, method.step, reached_rows)
         if cause := _driver_lost(run, method, start, reached_rows, status, lost):
             raise ComputationError(cause)
         if filled:
-            kept = with_all_reactions(assembled, Record(*(column[:filled] for column in chunk)))
+            kept = with_all_reactions(assembled, _first(reached_rows, filled))
             if watcher is not None:
                 kept, ends = watcher.look(kept)
             _look(run, kept)
@@ -344,7 +349,12 @@ def _advance(
             gained = run.energy.gains
             settings = failing.Settings(method, gained[2] > 0, excess_of_gains(gained, run.energy.spacing))
             raise failing.failure(run.engine.system, run.engine.work, status, reached(run.engine, start), settings)
-        count = int(np.clip(count * SECONDS_PER_CALL / max(watch.last, 1e-6), 1, 10 * count))
+        count = int(min(max(count * SECONDS_PER_CALL / max(watch.last, 1e-6), 1), 10 * count))
+
+
+def _first(rows: Record, count: int) -> Record:
+    """The first rows of a record."""
+    return rows if count == rows.time.size else Record(*(column[:count] for column in rows))
 
 
 def _require_soft(run: _Run, method: Integrator, status: int, time: float) -> None:
@@ -362,7 +372,8 @@ def _first_rows(system: System, method: Integrator, substeps: int) -> int:
     if system.model.user_count:
         return 1
     evaluations = substeps * max(method.stage_count, 1)
-    return int(np.clip(SECONDS_PER_CALL / SURE / (1e-6 * evaluations * evaluation_cost(system.scene)), 1, MOST_ROWS))
+    fitting = SECONDS_PER_CALL / SURE / (1e-6 * evaluations * evaluation_cost(system.scene))
+    return int(min(max(fitting, 1), MOST_ROWS))
 
 
 def evaluation_cost(scene: Scene) -> float:

@@ -23,6 +23,7 @@ from ffr_dyn.analyses.settings import MomentSettings
 from ffr_dyn.analyses.states import scene_at
 from ffr_dyn.analyses.static import static
 from ffr_dyn.compile.engine import with_model
+from ffr_dyn.compile.structure import Structure
 from ffr_dyn.consistency.assemble import assemble, seen_in_space
 from ffr_dyn.consistency.doubts import KINK, checked
 from ffr_dyn.consistency.evaluation import Evaluator, evaluate, evaluator
@@ -266,7 +267,7 @@ def _here(near: Chart) -> At:
 def _without_inputs(near: Chart, inputs: tuple[Effort | str, ...]) -> Chart:
     """With the efforts, which are of one in the scene, left out of what is computed from its declarations."""
     system = near.at.system
-    plain = replace(system, scene=without(system.scene, _efforts(inputs)))
+    plain = replace(system, scene=without(system.scene, _efforts(inputs)), structure=Structure())
     return replace(near, at=replace(near.at, engine=replace(near.at.engine, system=plain)))
 
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from functools import lru_cache
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -21,6 +20,7 @@ from ffr_dyn.equations.layout import Layout
 from ffr_dyn.kernels.entry_points import evaluate_markers, evaluate_rows
 from ffr_dyn.kernels.tables import ALL, Model, RowWork
 from ffr_dyn.scene.scene import Scene
+from ffr_prep.body import remembered
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.brief import Brief
 
@@ -85,11 +85,15 @@ def constraints_of(scene: Scene, blocks: list[Block], time: float) -> Constraint
     for function, (block, word) in zip(rows.function.tolist(), said, strict=True):
         if function >= 0:
             drives[function] = drive_at(block, word, time)
-    return Constraints(scene, place, tuple(blocks), _numbers(system), drives, engine, entries_of(system.model, place))
+    return Constraints(scene, place, tuple(blocks), _numbers(system), drives, engine, entries_of(system))
 
 
 def _numbers(system: System) -> Array:
     """(C,) of the rows in the order of the blocks that were compiled, those in the tables, where these have another."""
+    return remembered(system.structure, ("rows", system.elimination.order), lambda: _rows_as_given(system))
+
+
+def _rows_as_given(system: System) -> Array:
     order, start = system.elimination.order, system.model.rows.start
     first = dict(zip(order, start[:-1].tolist(), strict=True))
     sizes = dict(zip(order, np.diff(start).tolist(), strict=True))
@@ -143,28 +147,16 @@ def _jacobian(constraints: Constraints) -> Matrix:
     return csr_array((entries, np.divmod(found.at, size[1])), shape=size)[numbers]
 
 
-def entries_of(model: Model, place: Layout) -> Entries:
-    """Entries of the rows of a scene; those of the last structures are known by the integers that make them."""
-    m = model.markers
-    return _entries(
-        model.rows.marker.shape[1], *map(_listed, (model.rows.marker, model.rows.start, m.body, m.start)), place
+def entries_of(system: System) -> Entries:
+    """Entries of the rows of a scene, which those of its structure share."""
+    return remembered(system.structure, "entries", lambda: _entries(system.model, system.layout))
+
+
+def _entries(m: Model, place: Layout) -> Entries:
+    sides = m.rows.marker.shape[1]
+    markers, start, body, phi = (
+        table.ravel().tolist() for table in (m.rows.marker, m.rows.start, m.markers.body, m.markers.start)
     )
-
-
-def _listed(table: Array) -> tuple[int, ...]:
-    return tuple(table.ravel().tolist())
-
-
-@lru_cache(64)
-def _entries(
-    sides: int,
-    markers: tuple[int, ...],
-    start: tuple[int, ...],
-    body: tuple[int, ...],
-    phi: tuple[int, ...],
-    place: Layout,
-) -> Entries:
-    """Entries by markers on all sides of the blocks, first rows of the blocks, and body and place in `phi` of all markers."""
     row, side, lane, first = list[int](), list[int](), list[int](), list[int]()
     flexible = list[tuple[slice, int, int]]()
     for number, marker in enumerate(markers):

@@ -30,6 +30,8 @@ def relations_off(constraints: Constraints, x: Array) -> Iterator[tuple[int, flo
     """Of the rows of couplings and screws that stand whole turns off at x, which meets all rows: the number of their function
     among the drives, by how much they are off, and what whole turns make of them."""
     relations = _relations(constraints.scene)
+    if not relations:
+        return
     rows = {block.name: (word, f) for block, word, f in _rows(constraints) if word.kind == RELATION}
     off = {at: _off(constraints, x, at, value) for at, value in _prescribed(constraints, relations).items()}
     for block, first, second, ratio, _ in relations:

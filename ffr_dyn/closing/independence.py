@@ -13,7 +13,7 @@ import numpy as np
 from scipy.linalg import qr
 from scipy.sparse import csr_array, vstack
 
-from ffr_dyn.closing.constraints import Constraints, of_blocks, rows_at, without
+from ffr_dyn.closing.constraints import Constraints, RowsAt, of_blocks, rows_at, without
 from ffr_dyn.closing.going_on import going_on
 from ffr_dyn.closing.positions import TOLERANCE, close_positions, largest_turn, weights
 from ffr_dyn.closing.row_space import Dependence, Matrix, dependence, smallest_solution
@@ -43,9 +43,9 @@ class Independent(Brief):
     singular: bool
 
 
-def independent_blocks(constraints: Constraints, x: Array, v: Array) -> Independent:
-    """The rows that the motion needs. Raises InputError when a driver's row is redundant."""
-    here = _dependence(constraints, x, v)
+def independent_blocks(constraints: Constraints, x: Array, v: Array, rows: RowsAt) -> Independent:
+    """The rows that the motion needs, of those given at (x, v). Raises InputError when a driver's row is redundant."""
+    here = _dependence_of(constraints, x, rows)
     in_motion = _in_motion(constraints, x, v, here)
     blocks, N, singular = list(constraints.blocks), in_motion.combinations, here.count > in_motion.count
     if drivers := _drivers_in(N, blocks):
@@ -137,7 +137,11 @@ def _at_neighbours(constraints: Constraints, x: Array, v: Array) -> Dependence |
 
 
 def _dependence(constraints: Constraints, x: Array, v: Array) -> Dependence:
-    J = rows_at(constraints, x, v).J
+    return _dependence_of(constraints, x, rows_at(constraints, x, v))
+
+
+def _dependence_of(constraints: Constraints, x: Array, rows: RowsAt) -> Dependence:
+    J = rows.J
     return dependence(J @ weights(constraints.scene, constraints.place, x, True, isinstance(J, np.ndarray)))
 
 

@@ -62,9 +62,12 @@ def _open(constraints: Constraints, rows: RowsAt) -> InputError:
     )
 
 
-def close_velocities(constraints: Constraints, x: Array, v: Array) -> Array:
-    """Velocities with Phi_q v + Phi_t = 0, nearest to v; rigid motion first. Raises InputError where there are none."""
-    place, rows = constraints.place, rows_at(constraints, x, v)
+def close_velocities(constraints: Constraints, x: Array, v: Array, rows: RowsAt | None = None) -> Array:
+    """Velocities with Phi_q v + Phi_t = 0, nearest to v; rigid motion first. Raises InputError where there are none.
+
+    rows : those at (x, v), where they are known
+    """
+    place, rows = constraints.place, rows or rows_at(constraints, x, v)
     left = np.zeros(0)
     for elastic in (False, True):
         step = _step(constraints, x, rows, -rows.nu, elastic)

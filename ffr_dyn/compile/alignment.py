@@ -7,7 +7,7 @@ ones all begin at the same place of a page, which the processor takes for one an
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import accumulate
@@ -32,12 +32,22 @@ class Form:
 
 
 @dataclass(frozen=True)
+class Plan:
+    """How a named tuple is made of a list of arrays and other values: which of these its fields are, or plans of their own.
+
+    An array that is there twice stays one.
+    """
+
+    make: Callable[[Iterable[Any]], Any]
+    fields: list[int | Plan]
+
+
+@dataclass(frozen=True)
 class Piece(Generic[T]):
     """Nested named tuples with all their arrays in one piece, to be copied as often as wanted.
 
     words : as `pack` writes them;  numbers : the piece, eight bytes each
-    form  : of the arrays
-    order : which array each field holds, one field after the other; an array that is there twice stays one
+    form  : of the arrays;  others : values of fields that are none;  plan : of the tables, from arrays and others
     places : of the addresses among the words
     """
 
@@ -45,7 +55,8 @@ class Piece(Generic[T]):
     words: Array
     numbers: Array
     form: Form
-    order: list[int]
+    others: list[Any]
+    plan: Plan
     places: Array
 
 
@@ -59,10 +70,10 @@ def in_one_piece(tables: T, but: str = "") -> Piece[T]:
 
     but : a field that is an empty tuple, of which the words are left open
     """
-    made, numbers, form, order = _laid_out(tables)
+    made, numbers, form, others, plan = _laid_out(tables)
     address = address_of(numbers)
-    words = pack(made, [address + form.begin[k] for k in order], but)
-    return Piece(made, words, numbers, form, order, places_of_addresses(type(made), but))
+    words = pack(made, [address + form.begin[k] for k in _order(plan) if k < len(form.begin)], but)
+    return Piece(made, words, numbers, form, others, plan, places_of_addresses(type(made), but))
 
 
 def copied(piece: Piece[T]) -> tuple[T, Array]:
@@ -70,19 +81,22 @@ def copied(piece: Piece[T]) -> tuple[T, Array]:
     numbers, words = _room(piece.numbers.size), piece.words.copy()
     numbers[:] = piece.numbers
     words[piece.places] += address_of(numbers) - address_of(piece.numbers)
-    return _replaced(piece.tables, _views(numbers, piece.form), iter(piece.order)), words
+    return _made(piece.plan, [*_views(numbers, piece.form), *piece.others]), words
 
 
-def _laid_out(tables: T) -> tuple[T, Array, Form, list[int]]:
+def _laid_out(tables: T) -> tuple[T, Array, Form, list[Any], Plan]:
     """`Piece.tables` and what follows its words."""
-    arrays, fields = dict[int, Array](), list[int]()
-    _gather(tables, arrays, fields)
+    values = {id(value): value for value in _leaves(tables)}
+    arrays = {key: value for key, value in values.items() if isinstance(value, np.ndarray)}
+    others = {key: value for key, value in values.items() if key not in arrays}
     form = _form(tuple((array.dtype, array.shape) for array in arrays.values()))
-    numbers, place = _room(form.whole.itemsize // 8), {key: number for number, key in enumerate(arrays)}
-    views, order = _views(numbers, form), [place[key] for key in fields]
+    numbers = _room(form.whole.itemsize // 8)
+    views = _views(numbers, form)
     for view, array in zip(views, arrays.values(), strict=True):
         view[...] = array
-    return _replaced(tables, views, iter(order)), numbers, form, order
+    plan = _planned(tables, {key: number for number, key in enumerate([*arrays, *others])})
+    rest = list(others.values())
+    return _made(plan, [*views, *rest]), numbers, form, rest, plan
 
 
 @lru_cache(256)
@@ -107,22 +121,26 @@ def _views(numbers: Array, form: Form) -> tuple[Array, ...]:
     return np.ndarray((), form.whole, numbers).item()  # type: ignore[no-any-return]
 
 
-def _gather(tables: Any, found: dict[int, Array], fields: list[int]) -> None:
+def _leaves(tables: Any) -> Iterator[Any]:
+    """What the fields of nested tuples hold, one after the other."""
     for field in tables:
-        if isinstance(field, np.ndarray):
-            found[id(field)] = field
-            fields.append(id(field))
-        elif isinstance(field, tuple):
-            _gather(field, found, fields)
+        if isinstance(field, tuple):
+            yield from _leaves(field)
+        else:
+            yield field
 
 
-def _replaced(tables: Any, arrays: Sequence[Array], order: Iterator[int]) -> Any:
-    fields = [
-        arrays[next(order)]
-        if isinstance(field, np.ndarray)
-        else _replaced(field, arrays, order)
-        if isinstance(field, tuple)
-        else field
-        for field in tables
-    ]
-    return type(tables)._make(fields) if hasattr(tables, "_fields") else tuple(fields)
+def _planned(tables: Any, number: dict[int, int]) -> Plan:
+    """number : of each value, by its identity"""
+    fields = [_planned(field, number) if isinstance(field, tuple) else number[id(field)] for field in tables]
+    return Plan(type(tables)._make if hasattr(tables, "_fields") else tuple, fields)
+
+
+def _made(plan: Plan, values: list[Any]) -> Any:
+    return plan.make(_made(field, values) if isinstance(field, Plan) else values[field] for field in plan.fields)
+
+
+def _order(plan: Plan) -> Iterator[int]:
+    """Numbers of the values, field by field."""
+    for field in plan.fields:
+        yield from _order(field) if isinstance(field, Plan) else (field,)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass
 from itertools import accumulate
+from typing import NamedTuple
 
 import numpy as np
 
@@ -25,6 +26,7 @@ from ffr_dyn.kernels.tables import (
     Bodies,
     N,
 )
+from ffr_dyn.kernels.vectors import LEAST_PIVOT
 from ffr_dyn.scene.scene import Body, Scene
 from ffr_dyn.variants.families import ROUNDING, rounding_of
 from ffr_prep.body import axial, remembered
@@ -106,7 +108,7 @@ NO_BLOCKS = np.zeros(0), np.zeros(0, dtype=np.int64)
 
 @dataclass(frozen=True)
 class _Tables:
-    """Of one body: parts of the tables; PP_dm in blocks, a pool and a plan."""
+    """Of one body: parts of the tables; PP_dm in blocks, a pool and a plan; of a rigid one what `RigidBodies` holds of it."""
 
     mass: float
     moments: Array
@@ -114,6 +116,7 @@ class _Tables:
     P_dm: Array
     rP_dm: Array
     PP_dm: tuple[Array, Array]
+    rigid: tuple[Array, Array, Array] | None = None
 
 
 def _tables(body: Body, normal: int) -> _Tables:
@@ -126,7 +129,8 @@ def _tables(body: Body, normal: int) -> _Tables:
 def _made(body: Body, kept: Integrals, normal: int) -> _Tables:
     moments, P_dm = np.concatenate([kept.r_dm, _six(kept.rr_dm)]), kept.P_dm.ravel()
     if not body.model.n:
-        return _Tables(kept.mass, moments, kept.omega2, P_dm, P_dm, NO_BLOCKS)
+        rigid = _rigid_inertia(moments, kept.mass, normal)
+        return _Tables(kept.mass, moments, kept.omega2, P_dm, P_dm, NO_BLOCKS, rigid)
     return _Tables(
         kept.mass, moments, kept.omega2, P_dm, _nine(kept.rP_dm).ravel(), _second_moments(body, kept, normal)
     )
@@ -142,8 +146,73 @@ def _second_moments(body: Body, kept: Integrals, normal: int) -> tuple[Array, Ar
     return in_blocks(table, table.shape[1] // 3, noise[:, None])
 
 
-def body_tables(scene: Scene, place: Layout) -> Bodies:
-    """Tables of all bodies."""
+def masses_and_moments(scene: Scene, place: Layout) -> tuple[Array, Array]:
+    """`Bodies.mass` and `Bodies.moments`."""
+    of = [_tables(body, normal) for body, normal in zip(scene.bodies, place.normals, strict=True)]
+    return np.array([i.mass for i in of]), np.array([i.moments for i in of])
+
+
+class RigidBodies(NamedTuple):
+    """What is constant of bodies: of R rigid ones, by numbers (R,), s (R, 3), J (R, 3, 3), L (R, 6, 6); inverse (B, 2), of
+    flexible bodies 1 / mass alone. See `BodyWork`."""
+
+    numbers: Array
+    s: Array
+    J: Array
+    L: Array
+    inverse: Array
+
+
+def rigid_bodies(scene: Scene, place: Layout) -> RigidBodies:
+    """Of a scene."""
+    of = [_tables(body, normal) for body, normal in zip(scene.bodies, place.normals, strict=True)]
+    inverse = [(_inverse(i.mass), _inverse(sum(i.rigid[1].diagonal().tolist())) if i.rigid else 0.0) for i in of]
+    numbers = [b for b, i in enumerate(of) if i.rigid]
+    s, J, L = zip(*(i.rigid for i in of if i.rigid), strict=True) if numbers else ((), (), ())
+    return RigidBodies(
+        np.array(numbers, dtype=np.int64),
+        np.array(s).reshape(-1, 3),
+        np.array(J).reshape(-1, 3, 3),
+        np.array(L).reshape(-1, 6, 6),
+        np.array(inverse),
+    )
+
+
+def _inverse(number: float) -> float:
+    """Zero where there is none: such a body is found when it is factorised."""
+    return 1.0 / number if number > 0.0 else 0.0
+
+
+def _rigid_inertia(moments: Array, mass: float, normal: int) -> tuple[Array, Array, Array]:
+    """(first moment, inertia tensor, factor as the kernels want it) of a rigid body; -1 for a factor that does not exist."""
+    x, y, z, xx, yy, zz, xy, xz, yz = moments.tolist()
+    first, J = moments[:3], np.array([[yy + zz, -xy, -xz], [-xy, xx + zz, -yz], [-xz, -yz, xx + yy]])
+    M = [
+        [mass, 0.0, 0.0, 0.0, 0.0, 0.0],
+        [0.0, mass, 0.0, 0.0, 0.0, 0.0],
+        [0.0, 0.0, mass, 0.0, 0.0, 0.0],
+        [0.0, -z, y, yy + zz, 0.0, 0.0],
+        [z, 0.0, -x, -xy, xx + zz, 0.0],
+        [-y, x, 0.0, -xz, -yz, xx + yy],
+    ]  # the lower triangle, which is all that is read
+    moving = list(range(6)) if normal < 0 else [*(c for c in range(3) if c != normal), 3 + normal]
+    own = np.array([[M[row][column] for column in moving] for row in moving])
+    try:
+        factor = np.linalg.cholesky(own)
+    except np.linalg.LinAlgError:
+        return first, J, np.full((6, 6), -1.0)
+    pivots = factor.diagonal()
+    if (pivots**2 <= LEAST_PIVOT * own.diagonal()).any():
+        return first, J, np.full((6, 6), -1.0)
+    factor.flat[:: len(moving) + 1] = 1.0 / pivots
+    L = np.eye(6)
+    for row, k in zip(factor, moving, strict=True):
+        L[k, moving] = row
+    return first, J, L
+
+
+def body_tables(scene: Scene, place: Layout, mass: Array, moments: Array) -> Bodies:
+    """Tables of all bodies, with these masses and moments."""
     of = [_tables(body, normal) for body, normal in zip(scene.bodies, place.normals, strict=True)]
     owners = [_owner(body) for body in scene.bodies]
     in_plane = [(*owner, k) * (n > 0) for owner, k, n in zip(owners, place.normals, place.n, strict=True)]
@@ -161,8 +230,8 @@ def body_tables(scene: Scene, place: Layout) -> Bodies:
     where[:, IN_Q] = starts(place.n)
     return Bodies(
         where=where,
-        mass=np.array([i.mass for i in of]),
-        moments=np.array([i.moments for i in of]),
+        mass=mass,
+        moments=moments,
         P_dm=_pool([of[b].P_dm for b in own]),
         rP_dm=_pool([of[b].rP_dm for b in own]),
         PP_dm=PP.pool,

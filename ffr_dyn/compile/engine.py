@@ -8,13 +8,11 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
-from ffr_dyn.compile.first_use import ensure_compiled
 from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.compile.stiff_rows import with_stiff_rows
-from ffr_dyn.compile.workspace import new_tables
+from ffr_dyn.compile.workspace import memory_of, new_tables
 from ffr_dyn.functions.time_functions import OPERATION, PIECEWISE, USER
-from ffr_dyn.kernels.entry_points import evaluate_exact, evaluate_loads, record_state, run, run_controlled, step
-from ffr_dyn.kernels.simd.force_kernel import kernel_of
+from ffr_dyn.kernels.entry_points import evaluate_exact, evaluate_loads, record_state, run, run_controlled
 from ffr_dyn.kernels.simd.table_address import address_of, pack, place_of
 from ffr_dyn.kernels.tables import NOT_FINITE, OK, PER_ROW, SPACING, Control, Model, Record, Tables, Work
 from ffr_prep.common.arrays import Array
@@ -74,14 +72,9 @@ def new_engine(
     """
     if method is not None and method.takes_forces:
         system = with_stiff_rows(system)
-    kinds = () if method is None else (type(method),)
-    ensure_compiled(*kinds, chosen=system.chosen, forces=system.kernels)
-    tables, words = new_tables(system, method, keeps_passed)
-    tables.entry_points[:] = [0 if each is None else each.address for each in system.chosen]
-    tables.forces[:] = [kernel_of(kernel).address for kernel in system.kernels]
+    tables, words = new_tables(system, memory_of(system, method, keeps_passed))
     tables.clock.time[SPACING] = spacing
     if method is not None:
-        tables.entry_points[step.number] = method.do_step.address
         tables.stages.numbers[:] = method.numbers
         tables.clock.time[: SPACING + 1] = method.step, method.step or spacing
         if method.controlled:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import accumulate
 from typing import Any
 
 import numpy as np
@@ -81,14 +82,17 @@ class FunctionTable:
 
     def inputs(self) -> dict[str, tuple[int, ...]]:
         """By name, where the numbers of a signal begin in the tables."""
-        starts = np.cumsum([0, *(len(f.data) for f in self.functions)])
-        return {name: tuple(int(starts[k]) for k in numbers) for name, (_, numbers) in self.signals.items()}
+        begin = self._starts()
+        return {name: tuple(begin[k] for k in numbers) for name, (_, numbers) in self.signals.items()}
+
+    def _starts(self) -> list[int]:
+        """Where the numbers of each function begin, and the end."""
+        return list(accumulate((len(f.data) for f in self.functions), initial=0))
 
     def tables(self) -> Functions:
-        sizes = [len(f.data) for f in self.functions]
         return Functions(
             kind=np.array([f.kind for f in self.functions], dtype=np.int64),
-            start=np.concatenate([[0], np.cumsum(sizes, dtype=np.int64)]).astype(np.int64),
+            start=np.array(self._starts(), dtype=np.int64),
             data=np.array([number for f in self.functions for number in f.data], dtype=float),
             breaks=declared_breaks(self.functions),
             switches=switches(self.functions),

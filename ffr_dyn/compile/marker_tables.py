@@ -20,8 +20,14 @@ from ffr_prep.body import remembered
 from ffr_prep.common.arrays import Array
 
 
-def marker_tables(scene: Scene, place: Layout, blocks: tuple[Block, ...]) -> Markers:
-    """Tables of all markers of a scene with the constraint rows of `blocks`."""
+def points(scene: Scene) -> Array:
+    """`Markers.u`."""
+    places = [interface.position for body in scene.bodies for interface in body.model.interfaces]
+    return np.array([*places, *scene.ground.values()]).reshape(-1, 3)
+
+
+def marker_tables(scene: Scene, place: Layout, blocks: tuple[Block, ...], u: Array) -> Markers:
+    """Tables of all markers of a scene at points u, with the constraint rows of `blocks`."""
     table, ground = markers(scene), len(scene.bodies)
     interfaces = [i for body in scene.bodies for i in body.model.interfaces]
     bends = [b < ground and is_second_order(scene.bodies[b]) for b, _, _ in table]
@@ -43,7 +49,7 @@ def marker_tables(scene: Scene, place: Layout, blocks: tuple[Block, ...]) -> Mar
     turns = [int(k in turning) for k in range(len(table))]
     return Markers(
         body=np.array([entry[0] for entry in table], dtype=np.int64),
-        u=np.array([i.position for i in interfaces] + list(scene.ground.values())).reshape(-1, 3),
+        u=u,
         phi=phi,
         start=start,
         second=np.array([turns, counts, bending.start, bending.first], dtype=np.int64).T.copy(),

@@ -32,22 +32,27 @@ def alike(scene: Scene, place: Layout) -> list[Hashable]:
     ]
 
 
-def row_tables(blocks: tuple[Block, ...], functions: FunctionTable) -> Rows:
-    """The rows of all blocks; their functions of time go to `functions`."""
+def row_numbers(blocks: tuple[Block, ...], functions: FunctionTable) -> tuple[Array, Array, Array]:
+    """`Rows.axes`, `.relation` and `.function` of all blocks; their functions of time go to `functions`."""
     said = [(block, word) for block in blocks for word in block.words]
     function = [-1 if w.function is None else functions.add(w.function, f"{b.name!r}") for b, w in said]
-    listed = [word for _, word in said]
-    axes = np.zeros((len(listed), 6, 3))
-    for row, word in enumerate(listed):
+    axes = np.zeros((len(said), 6, 3))
+    for row, (_, word) in enumerate(said):
         axes[row, : len(word.axes)] = word.axes
+    relation = np.array([_relation(word) for _, word in said], dtype=float).reshape(-1, 5)
+    return axes, relation, np.array(function, dtype=np.int64)
+
+
+def row_tables(blocks: tuple[Block, ...], axes: Array, relation: Array, function: Array) -> Rows:
+    """The rows of all blocks, with these numbers."""
     sides = max((len(block.markers) for block in blocks), default=2)
     marker = np.array([b.markers + (-1,) * (sides - len(b.markers)) for b in blocks], dtype=np.int64).reshape(-1, sides)
     begin = starts([len(b.words) for b in blocks])
     return Rows(
-        kind=np.array([WORDS.index(word.kind) for word in listed], dtype=np.int64),
+        kind=np.array([WORDS.index(word.kind) for block in blocks for word in block.words], dtype=np.int64),
         axes=axes,
-        relation=np.array([_relation(word) for word in listed], dtype=float).reshape(-1, 5),
-        function=np.array(function, dtype=np.int64),
+        relation=relation,
+        function=function,
         start=begin,
         forced=begin[1:].copy(),
         reaction=np.arange(len(blocks), dtype=np.int64),

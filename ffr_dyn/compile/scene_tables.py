@@ -3,25 +3,29 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Mapping
+from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
-from ffr_dyn.compile.alignment import in_one_piece
-from ffr_dyn.compile.body_tables import body_tables
+from ffr_dyn.compile.alignment import Piece, copied, in_one_piece
+from ffr_dyn.compile.body_tables import RigidBodies, body_tables, masses_and_moments, rigid_bodies
 from ffr_dyn.compile.elimination import Elimination, eliminate
 from ffr_dyn.compile.force_tables import Callback, FunctionTable, base_functions, load_tables
-from ffr_dyn.compile.marker_tables import marker_tables
-from ffr_dyn.compile.row_tables import alike, moving_bodies, pattern_of, row_tables
+from ffr_dyn.compile.marker_tables import marker_tables, points
+from ffr_dyn.compile.row_tables import alike, moving_bodies, pattern_of, row_numbers, row_tables
+from ffr_dyn.compile.structure import Recent, Structure, structure_key
 from ffr_dyn.equations.constraint_rows import Block, blocks_of
 from ffr_dyn.equations.layout import Layout, layout
 from ffr_dyn.equations.state_view import StateView
 from ffr_dyn.kernels.simd.entry_point import ENTRY_POINTS, CompiledFunction
-from ffr_dyn.kernels.tables import Model
+from ffr_dyn.kernels.simd.table_address import place_of
+from ffr_dyn.kernels.tables import Functions, Loads, Model
 from ffr_dyn.scene.force_kinds import kernels_of
 from ffr_dyn.scene.scene import Scene, markers
+from ffr_prep.body import remembered
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.brief import Brief
 from ffr_prep.common.errors import InputError
@@ -35,6 +39,7 @@ class System(Brief):
     inputs : where the numbers of a signal begin among those of the time functions, by its name
     purposes : what each time function is for
     words : the tables as `pack` writes them
+    structure : what it has in common with other scenes, with what is remembered of that
     """
 
     scene: Scene
@@ -46,17 +51,23 @@ class System(Brief):
     inputs: Mapping[str, tuple[int, ...]]
     purposes: tuple[str, ...]
     words: Array
+    structure: Structure
 
-    @cached_property
+    @property
     def kernels(self) -> tuple[CompiledFunction | str, ...]:
         """Kernels of the forces, by number."""
         return tuple(kernels_of(self.scene))
 
-    @cached_property
+    @property
     def chosen(self) -> tuple[CompiledFunction | None, ...]:
         """Compiled forms of all entry points, by number; None for those that the scene does not call."""
         m = self.model
         return tuple(entry.chosen(m) if entry.needed(m) else None for entry in ENTRY_POINTS.values())
+
+    @cached_property
+    def rigid(self) -> RigidBodies:
+        """What is constant of its rigid bodies."""
+        return rigid_bodies(self.scene, self.layout)
 
 
 def compile_scene(scene: Scene, blocks: list[Block] | None = None, relaxation: float = 0.0) -> System:
@@ -66,32 +77,114 @@ def compile_scene(scene: Scene, blocks: list[Block] | None = None, relaxation: f
     relaxation : above zero where rows depend on one another (`ffr_dyn.kernels.entry_points.solve_of_dependent_rows`)
     """
     chosen = blocks_of(scene) if blocks is None else blocks
-    place = layout(scene)
-    table = markers(scene)
-    ground = len(scene.bodies)
+    place, table, ground = layout(scene), markers(scene), len(scene.bodies)
     moving = [moving_bodies(block, table, ground) for block in chosen]
     elimination = eliminate([len(k.words) for k in chosen], moving)
     ordered = tuple(chosen[k] for k in elimination.order)
     functions = FunctionTable()
-    marked = marker_tables(scene, place, ordered)
-    model = {
-        "gravity": np.array(scene.gravity),
-        "base": base_functions(scene, functions),
-        "relaxation": relaxation,
-        "bodies": body_tables(scene, place),
-        "markers": marked,
-        "rows": row_tables(ordered, functions),
-        "pattern": pattern_of(
-            ordered, [moving[k] for k in elimination.order], elimination, marked, alike(scene, place)
-        ),
-        "loads": load_tables(scene, functions),
-        "functions": functions.tables(),
-    }
+    numbers = _numbers(scene, place, ordered, functions)
+    sizes = tuple(array.shape for array in _listed(numbers)), functions.slots, relaxation
+
+    def made() -> Piece[Model]:
+        ties = [moving[k] for k in elimination.order]
+        return in_one_piece(_model(scene, place, ordered, ties, elimination, numbers, functions.slots, relaxation))
+
+    structure, tables, words = _tables((structure_key(scene, place, ordered), sizes), scene, place, made)
+    for into, given in zip(_listed(_numbers_in(tables)), _listed(numbers), strict=True):
+        into[...] = given
     user = UserFunctions(functions.callbacks, place, scene)
-    compiled = Model(**model, user_address=user.address, user_count=user.count, stiff_count=0)  # type: ignore[arg-type]
-    piece = in_one_piece(compiled)
+    words[place_of(Model, "user_address")] = user.address
+    model = tables._replace(user_address=user.address)
     inputs, purposes = functions.inputs(), tuple(functions.purposes)
-    return System(scene, place, ordered, elimination, piece.tables, user, inputs, purposes, piece.words)
+    return System(scene, place, ordered, elimination, model, user, inputs, purposes, words, structure)
+
+
+TABLES = "tables"  # what is remembered of a structure: those of its first scene, to be copied
+# Structures that are known; numbers in the tables, and velocities, of one that is not: its scenes take longer than it does.
+MOST, LARGE, WIDE = 32, 200_000, 600
+
+_KNOWN = Recent[Structure](MOST)
+
+
+def _tables(
+    key: Hashable, scene: Scene, place: Layout, made: Callable[[], Piece[Model]]
+) -> tuple[Structure, Model, Array]:
+    """The structure of this key, and tables with their words that are those of the scene but for its numbers."""
+    structure = _KNOWN.find(key, scene)
+    if structure is None:
+        piece = made()
+        if piece.numbers.size >= LARGE or place.v_size >= WIDE:
+            return Structure(shared=False), piece.tables, piece.words
+        structure = Structure()
+        remembered(structure, TABLES, lambda: piece)
+        _KNOWN.keep(key, scene, structure)
+    return structure, *copied(remembered(structure, TABLES, made))
+
+
+class _Numbers(NamedTuple):
+    """Tables that are not the same for all scenes of a structure, by the names that they have in the model."""
+
+    gravity: Array
+    base: Array
+    mass: Array
+    moments: Array
+    u: Array
+    axes: Array
+    relation: Array
+    function: Array
+    functions: Functions
+    loads: Loads
+
+
+def _numbers(scene: Scene, place: Layout, blocks: tuple[Block, ...], functions: FunctionTable) -> _Numbers:
+    """Of a scene; its functions of time go to `functions`."""
+    base = base_functions(scene, functions)
+    axes, relation, function = row_numbers(blocks, functions)
+    loads = load_tables(scene, functions)
+    masses = masses_and_moments(scene, place)
+    return _Numbers(
+        np.array(scene.gravity), base, *masses, points(scene), axes, relation, function, functions.tables(), loads
+    )
+
+
+def _numbers_in(m: Model) -> _Numbers:
+    """Those of a model."""
+    bodies, rows = m.bodies, m.rows
+    of_rows = rows.axes, rows.relation, rows.function
+    return _Numbers(m.gravity, m.base, bodies.mass, bodies.moments, m.markers.u, *of_rows, m.functions, m.loads)
+
+
+def _listed(numbers: _Numbers) -> list[Array]:
+    *arrays, functions, loads = numbers
+    return [*arrays, *functions, *loads]
+
+
+def _model(
+    scene: Scene,
+    place: Layout,
+    blocks: tuple[Block, ...],
+    ties: list[tuple[int, ...]],
+    elimination: Elimination,
+    numbers: _Numbers,
+    user_count: int,
+    relaxation: float,
+) -> Model:
+    """The whole tables; ties : the moving bodies of each block."""
+    marked = marker_tables(scene, place, blocks, numbers.u)
+    return Model(
+        gravity=numbers.gravity,
+        base=numbers.base,
+        relaxation=relaxation,
+        bodies=body_tables(scene, place, numbers.mass, numbers.moments),
+        markers=marked,
+        rows=row_tables(blocks, numbers.axes, numbers.relation, numbers.function),
+        pattern=pattern_of(blocks, ties, elimination, marked, alike(scene, place)),
+        functions=numbers.functions,
+        loads=numbers.loads,
+        user_address=0,
+        user_count=user_count,
+        stiff_count=0,
+    )
 
 
 # ---- the user's Python functions ----------------------------------------------------------------------------------

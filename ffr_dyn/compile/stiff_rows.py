@@ -15,12 +15,14 @@ from ffr_dyn.compile.body_tables import starts
 from ffr_dyn.compile.elimination import eliminate
 from ffr_dyn.compile.row_tables import alike, first_of_each, moving_bodies, pattern_of
 from ffr_dyn.compile.scene_tables import System
+from ffr_dyn.compile.structure import Structure
 from ffr_dyn.equations.constraint_rows import Block
 from ffr_dyn.kernels.simd.table_address import pack
 from ffr_dyn.kernels.tables import BLOCK, FORCED, LANE, LANES, Rows
 from ffr_dyn.scene.force_kinds import forces_of
 from ffr_dyn.scene.joints import Word
 from ffr_dyn.scene.scene import markers
+from ffr_prep.body import remembered
 from ffr_prep.common.arrays import Array
 
 Place = tuple[int, int]  # block and first lane of the rows of a force; -1, -1 where it has none
@@ -55,7 +57,12 @@ def with_stiff_rows(system: System) -> System:
         loads=m.loads._replace(row=row),
         stiff_count=int((rows.start[1:] - rows.forced).sum()),
     )
-    return replace(system, blocks=ordered, elimination=elimination, model=changed, words=pack(changed))
+    # Its memory is another one; which rows there are is all that it depends on beside the structure.
+    whole = system.structure
+    structure = remembered(whole, ("stiff rows", tuple(places)), lambda: Structure(whole.shared))
+    return replace(
+        system, blocks=ordered, elimination=elimination, model=changed, words=pack(changed), structure=structure
+    )
 
 
 def _extended(system: System) -> tuple[list[Block], list[Place]]:

@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable
-from functools import lru_cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from ffr_dyn.compile.alignment import Piece, copied, in_one_piece
 from ffr_dyn.compile.body_tables import starts
+from ffr_dyn.compile.first_use import ensure_compiled
 from ffr_dyn.compile.scene_tables import System
-from ffr_dyn.functions.rotation import skew
+from ffr_dyn.equations.layout import Layout
+from ffr_dyn.kernels.entry_points import step
+from ffr_dyn.kernels.simd.force_kernel import kernel_of
 from ffr_dyn.kernels.tables import (
     IN_Q,
     LANES,
     MOST_PASSED,
-    NORMAL,
     BodyWork,
     Clock,
     Control,
@@ -30,15 +30,11 @@ from ffr_dyn.kernels.tables import (
     Tables,
     Work,
 )
-from ffr_dyn.kernels.vectors import LEAST_PIVOT
+from ffr_prep.body import remembered
 from ffr_prep.common.arrays import Array
 
 if TYPE_CHECKING:
     from ffr_dyn.integrators import Integrator
-
-MOST, LARGE = 32, 100_000  # pieces of memory that are known, and numbers of one that is not
-
-_BLANK: dict[Hashable, Piece[Tables]] = {}
 
 
 class _Needs(NamedTuple):
@@ -53,39 +49,58 @@ class _Needs(NamedTuple):
     keeps_passed: bool = False
 
 
-def new_tables(system: System, method: Integrator | None, keeps_passed: bool) -> tuple[Tables, Array]:
-    """Memory for a scene and a method (none: evaluations alone), and its words (`pack`), those of the model left open.
+def memory_of(system: System, method: Integrator | None, keeps_passed: bool) -> Piece[Tables]:
+    """Memory for a scene and a method (none: evaluations alone), to be copied, with the addresses of what they call.
+
+    Scenes of one structure have the same; words of the model are left open. The first one of a kind waits until what it
+    needs is compiled.
 
     keeps_passed : whether positions beside singular ones are kept
-
-    Scenes of one structure have the same but for the numbers that `_fill` and an engine put there. What depends on the
-    elastic diagonal is made when that is set.
     """
+    kinds: tuple[type[Integrator], ...] = ()
     needs = _Needs(keeps_passed=keeps_passed)
     if method is not None:
         kept = 2 if method.repeatable else 0
         sizes = method.stage_count, method.row_stages, len(method.numbers), kept
-        needs = _Needs(*sizes, method.controlled, method.keeps_terms, keeps_passed)
-    key = _structure(system.model), needs, len(system.kernels)
-    blank = _BLANK.get(key)
-    if blank is None:
-        blank = in_one_piece(_blank(system, needs), but="model")
-        if len(_BLANK) >= MOST:
-            _BLANK.clear()
-        if blank.numbers.size < LARGE:
-            _BLANK[key] = blank
-    tables, words = copied(blank)
-    _fill(tables.work, system.model)
-    return tables._replace(model=system.model), words
+        kinds, needs = (type(method),), _Needs(*sizes, method.controlled, method.keeps_terms, keeps_passed)
+    if not system.structure.shared:
+        return _memory(system, kinds, needs)
+    return remembered(system.structure, ("memory", kinds, needs), lambda: _memory(system, kinds, needs))
 
 
-def _blank(system: System, needs: _Needs) -> Tables:
+def _memory(system: System, kinds: tuple[type[Integrator], ...], needs: _Needs) -> Piece[Tables]:
+    chosen, forces = system.chosen, system.kernels
+    ensure_compiled(*kinds, chosen=chosen, forces=forces)
+    addresses = np.array([0 if each is None else each.address for each in chosen], dtype=np.int64)
+    for kind in kinds:
+        addresses[step.number] = kind.do_step.address
+    kernels = np.array([kernel_of(kernel).address for kernel in forces], dtype=np.int64)
+    return in_one_piece(_blank(system, needs, addresses, kernels), but="model")
+
+
+def new_tables(system: System, memory: Piece[Tables]) -> tuple[Tables, Array]:
+    """Memory of its own for a scene, and its words (`pack`), those of the model left open.
+
+    In it is what is constant: shapes of linear bodies, factors of rigid ones, what forces measure at the start. What depends
+    on the elastic diagonal is made when that is set.
+    """
+    tables, words = copied(memory)
+    work, m, rigid = tables.work, system.model, system.rigid
+    work.markers.phi[:] = work.markers.kept[:] = m.markers.phi
+    work.loads.reference[:] = m.loads.initial
+    bodies = work.bodies
+    bodies.inverse[:] = rigid.inverse
+    bodies.s[rigid.numbers], bodies.J[rigid.numbers], bodies.L[rigid.numbers] = rigid.s, rigid.J, rigid.L
+    return tables._replace(model=m), words
+
+
+def _blank(system: System, needs: _Needs, entry_points: Array, forces: Array) -> Tables:
     X, V = system.layout.x_size, system.layout.v_size
     chosen = {"numbers": 8, "weight_x": X, "weight_v": V, "x": X, "v": V, "held_x": X, "held_v": V}
     return Tables(
         address=0,
-        entry_points=np.zeros(len(system.chosen), dtype=np.int64),
-        forces=np.zeros(len(system.kernels), dtype=np.int64),
+        entry_points=entry_points,
+        forces=forces,
         model=(),  # type: ignore[arg-type]  # each scene has its own
         work=_blank_work(system.model, needs.keeps_terms, needs.keeps_passed),
         stages=_stages(system, needs),
@@ -105,35 +120,6 @@ def _stages(system: System, needs: _Needs) -> Stages:
     states, kept = needs.states, needs.kept
     rows = _zeros(rows=(needs.rows, C), target=C, numbers=needs.numbers)
     return Stages(**_zeros(x=(states, X), v=(states, V), kept_x=(kept, X), kept_v=(kept, V)), **rows)
-
-
-def _structure(m: Model) -> Hashable:
-    """All that the scratch of a scene is made by, but for the numbers in it."""
-    tables = (m.bodies.where, m.rows.start, m.rows.marker, m.pattern.column_start, m.markers.body)
-    sizes = (
-        m.bodies.omega2,
-        m.bodies.coupled_damping,
-        m.markers.phi,
-        m.functions.kind,
-        m.loads.initial,
-        m.loads.kinked,
-        m.pattern.sample,
-    )
-    arrays = b"".join(table.tobytes() for table in tables), m.rows.marker.shape, tuple(map(len, sizes))
-    return arrays, m.user_count, m.relaxation > 0.0
-
-
-def _fill(work: Work, m: Model) -> None:
-    """Put in what is constant: shapes of linear bodies, factors of rigid ones, what forces measure at the start."""
-    bodies = work.bodies
-    work.markers.phi[:] = work.markers.kept[:] = m.markers.phi
-    work.loads.reference[:] = m.loads.initial
-    bodies.inverse[:, 0] = [_inverse(mass) for mass in m.bodies.mass.tolist()]
-    for b in np.flatnonzero(m.bodies.where[:-1, N] == 0).tolist():
-        numbers = m.bodies.moments[b].tobytes(), float(m.bodies.mass[b])
-        bodies.s[b], bodies.J[b], bodies.L[b] = _rigid_inertia(*numbers, int(m.bodies.where[b, NORMAL]))
-        xx, yy, zz = bodies.J[b].diagonal().tolist()
-        bodies.inverse[b, 1] = _inverse(xx + yy + zz)
 
 
 def _blank_work(m: Model, keeps_terms: bool, keeps_passed: bool) -> Work:
@@ -208,39 +194,6 @@ def _row_work(m: Model) -> RowWork:
     )
 
 
-def _inverse(number: float) -> float:
-    """Zero where there is none: such a body is found when it is factorised."""
-    return 1.0 / number if number > 0.0 else 0.0
-
-
-@lru_cache(1024)
-def _rigid_inertia(moments: bytes, mass: float, normal: int) -> tuple[Array, Array, Array]:
-    """(first moment, inertia tensor, factor as the kernels want it) of a rigid body; -1 for a factor that does not exist.
-
-    Of its numbers in `Bodies`, by which the last bodies are known: every run of a scene asks for them again.
-    """
-    first = np.frombuffer(moments)[:3]
-    xx, yy, zz, xy, xz, yz = np.frombuffer(moments)[3:].tolist()
-    J = np.array([[yy + zz, -xy, -xz], [-xy, xx + zz, -yz], [-xz, -yz, xx + yy]])
-    M, s = np.zeros((6, 6)), skew(first)
-    M[:3, :3].flat[::4] = mass
-    M[:3, 3:], M[3:, :3], M[3:, 3:] = -s, s, J
-    moving = list(range(6)) if normal < 0 else [*(c for c in range(3) if c != normal), 3 + normal]
-    own = M[moving][:, moving]
-    try:
-        factor = np.linalg.cholesky(own)
-    except np.linalg.LinAlgError:
-        return first, J, np.full((6, 6), -1.0)
-    pivots = factor.diagonal()
-    if (pivots**2 <= LEAST_PIVOT * own.diagonal()).any():
-        return first, J, np.full((6, 6), -1.0)
-    factor.flat[:: len(moving) + 1] = 1.0 / pivots
-    L = np.eye(6)
-    for row, k in zip(factor, moving, strict=True):
-        L[k, moving] = row
-    return first, J, L
-
-
 def _load_work(m: Model, V: int, X: int) -> LoadWork:
     kinks = len(m.loads.kinked)
     return LoadWork(
@@ -260,19 +213,20 @@ def _identities(count: int) -> Array:
 
 def new_record(system: System, rows: int) -> Record:
     """Room for `rows` output times."""
-    m, place = system.model, system.layout
-    M, K = m.markers.body.size, m.rows.marker.shape[0]
-    return Record(
-        np.zeros(rows),
-        np.zeros((rows, place.x_size)),
-        np.zeros((rows, place.v_size)),
-        np.zeros((rows, place.v_size)),
-        np.zeros((rows, M, 3)),
-        np.zeros((rows, M, 3)),
-        np.zeros((rows, K, 6)),
-        np.zeros((rows, m.loads.initial.size)),
-        np.zeros((rows, m.functions.kind.size, 3)),
-        np.zeros((rows, m.loads.row.shape[0])),
-        np.zeros((rows, 3)),
-        np.zeros((rows, 2)),
-    )
+    return Record(**{name: np.zeros((rows, *shape)) for name, shape in row_shapes(system).items()})
+
+
+def row_shapes(system: System) -> dict[str, tuple[int, ...]]:
+    """Of a row, the shape of its part of each column of a record; scenes of one structure share them."""
+    return remembered(system.structure, "row", lambda: _row_shapes(system.model, system.layout))
+
+
+def _row_shapes(m: Model, place: Layout) -> dict[str, tuple[int, ...]]:
+    M, K, X, V = m.markers.body.size, m.rows.marker.shape[0], place.x_size, place.v_size
+    of_forces = {
+        "forces": (m.loads.initial.size,),
+        "functions": (m.functions.kind.size, 3),
+        "power": (len(m.loads.row),),
+    }
+    states = {"time": (), "x": (X,), "v": (V,), "vd": (V,)}
+    return {**states, "r": (M, 3), "rd": (M, 3), "reaction": (K, 6), **of_forces, "energy": (3,), "violation": (2,)}

@@ -8,7 +8,6 @@ refused however fast, and no other row knows of it.
 
 from __future__ import annotations
 
-import weakref
 from collections.abc import Hashable
 
 import numpy as np
@@ -16,6 +15,7 @@ from scipy.sparse import csr_array, lil_array
 
 from ffr_dyn.closing.constraints import Constraints, constraints_of, rows_at
 from ffr_dyn.closing.row_space import Matrix, independent
+from ffr_dyn.compile.structure import Recent
 from ffr_dyn.equations.constraint_rows import Block, drive_at
 from ffr_dyn.equations.layout import Layout, initial_state, moved, to_global_axes, velocity_sizes
 from ffr_dyn.functions.time_functions import POLYNOMIAL, TimeFunction
@@ -23,7 +23,6 @@ from ffr_dyn.scene.joints import Word
 from ffr_dyn.scene.scene import Body, Scene, body_normal, used_interfaces
 from ffr_dyn.variants.aligned import height_of
 from ffr_dyn.variants.plane import AXES
-from ffr_prep.body import FlexibleBody
 from ffr_prep.common.arrays import Array
 
 ASKED = 1e-6  # of a row across the plane at random speeds of about one; modes carry rounding of 1e-9
@@ -31,9 +30,8 @@ ACROSS = 1e-8  # of the largest entry of a row, what counts as zero
 MOST = 256  # scenes that are remembered; then all are forgotten
 
 Found = tuple[Array, str]
-Models = list[weakref.ref[FlexibleBody]]
 
-_KNOWN: dict[Hashable, tuple[Models, Found]] = {}
+_KNOWN = Recent[Found](MOST)
 
 
 def rows_across(scene: Scene, blocks: list[Block], time: float) -> Found:
@@ -42,14 +40,12 @@ def rows_across(scene: Scene, blocks: list[Block], time: float) -> Found:
 
     Looked at in the position and with the motion that the scene declares, and at random in the plane around it.
     """
-    key, flexible = (_heights(scene), _key(scene, blocks, time)), [body.model for body in scene.bodies if body.model.n]
-    models, found = _KNOWN.get(key, ([], None))
-    if found is None or any(ref() is not model for ref, model in zip(models, flexible, strict=True)):
+    key = _heights(scene), _key(scene, blocks, time)
+    found = _KNOWN.find(key, scene)
+    if found is None:
         found = _looked_at(constraints_of(scene, blocks, time))
         found[0].setflags(write=False)
-        if len(_KNOWN) >= MOST:
-            _KNOWN.clear()
-        _KNOWN[key] = [weakref.ref(model) for model in flexible], found
+        _KNOWN.keep(key, scene, found)
     return found
 
 
@@ -72,7 +68,9 @@ def _said_of(body: Body) -> Hashable:
 
 
 def _said_by(block: Block, word: Word, time: float) -> Hashable:
-    value, changes = drive_at(block, word, time)[0], _changes(word.function)
+    value, changes = (
+        (0.0, False) if word.function is None else (drive_at(block, word, time)[0], _changes(word.function))
+    )
     return word.kind, word.axes.tobytes(), word.relation, word.spacing, value, changes
 
 

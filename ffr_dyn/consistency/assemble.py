@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ffr_dyn.closing.constraints import Constraints, constraints_of, without
+from ffr_dyn.closing.constraints import Constraints, constraints_of, rows_at, without
 from ffr_dyn.closing.coupled_turns import TURN
 from ffr_dyn.closing.driven_angles import driven_angles, led_to_drivers
 from ffr_dyn.closing.going_on import going_on
@@ -87,9 +87,10 @@ def assemble(scene: Scene, *, time: float = 0.0) -> Assembled:
     guess, given = initial_state(scene, place)
     x = led_to_drivers(rows, guess, lambda driven, at: close_positions(driven, at, given))
     _require_shape(scene, place, guess, x)
-    found = independent_blocks(rows, x, given)
+    here = rows_at(rows, x, given)
+    found = independent_blocks(rows, x, given, here)
     kept, redundant = found.blocks, found.redundant
-    v = close_velocities(rows, x, given)
+    v = close_velocities(rows, x, given, here)
     if found.singular:
         v = going_on(rows, x, v)
     count = sum(len(block.words) for block in kept)
@@ -153,19 +154,21 @@ def _beyond_tables(system: System) -> list[str]:
 
 def _uncounted(rows: Constraints, x: Array) -> list[str]:
     """A note where drivers tell whole turns, and forces on angles are to begin within half a turn."""
-    turns = max((round(angle.value / TURN) for angle in driven_angles(rows, x)), key=abs, default=0)
     begun = [
         force.name for force in rows.scene.forces if (force.place.way, getattr(force, "turns", None)) == ("angle", 0)
     ]
+    if not begun:
+        return []
+    turns = max((round(angle.value / TURN) for angle in driven_angles(rows, x)), key=abs, default=0)
     return [
         f"a driver begins {turns} whole turns on, and {', '.join(map(repr, begun))} within half a turn, as `turns` says: "
         "where it has turned along, give it the whole turns of its joint"
-    ] * (turns != 0 and bool(begun))
+    ] * (turns != 0)
 
 
 def shifted(scene: Scene, place: Layout, guess: Array, x: Array) -> list[str]:
     """A note on the bodies that assembly has moved or turned, the one moved most and the one turned most by name."""
-    if np.array_equal(x, guess):
+    if x is guess or np.array_equal(x, guess):
         return []
     shifts = [float(np.linalg.norm(x[place.R(b)] - guess[place.R(b)])) for b in range(len(place.n))]
     turns = [turned(x[place.p(b)], guess[place.p(b)]) for b in range(len(place.n))]
@@ -181,6 +184,8 @@ def shifted(scene: Scene, place: Layout, guess: Array, x: Array) -> list[str]:
 
 def _slowed(scene: Scene, place: Layout, given: Array, v: Array) -> list[str]:
     """A note where a body does not begin with the velocity that the scene gives it, on the one that is farthest off."""
+    if not given.any():
+        return []
     parts = [
         (float(np.linalg.norm(v[where] - given[where]) / size), body.name, word, v[where], given[where])
         for b, body in enumerate(scene.bodies)
@@ -208,7 +213,7 @@ def turned(p: Array, p0: Array) -> float:
 
 def _require_shape(scene: Scene, place: Layout, guess: Array, x: Array) -> None:
     """InputError where positions are met only by a body deformed beyond all sense."""
-    if np.array_equal(x, guess):
+    if x is guess or np.array_equal(x, guess):
         return
     for b, body in enumerate(scene.bodies):
         _, share = deflections(body.model, (x - guess)[None, place.q(b)])

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ffr_dyn.compile.scene_tables import System
-from ffr_dyn.compile.workspace import new_record
+from ffr_dyn.compile.workspace import row_shapes
 from ffr_dyn.consistency.evaluation import evaluate, evaluator, free_motions, total_mass_matrix
 from ffr_dyn.equations.forces import At
 from ffr_dyn.equations.inertia import damping_matrix
@@ -60,9 +60,9 @@ class Account:
     stops: dict[str, Array] = field(init=False)
 
     def __post_init__(self) -> None:
-        of, count = new_record(self.system, 1), len(_stops(self.system))
-        held = {f"{row}.{name}": getattr(of, name).shape[1:] for row in ("between", "last") for name in HELD}
-        sizes = {"pushed": (), "met": (2,), "met.x": of.x.shape[1:], "between": (3,), "last": (2,), **held}
+        of, count = row_shapes(self.system), len(_stops(self.system))
+        held = {f"{row}.{name}": of[name] for row in ("between", "last") for name in HELD}
+        sizes = {"pushed": (), "met": (2,), "met.x": of["x"], "between": (3,), "last": (2,), **held}
         object.__setattr__(self, "stops", {name: np.zeros((count, *size)) for name, size in sizes.items()})
 
 
@@ -88,9 +88,10 @@ def add_rows(account: Account, rows: Record, powers: Array) -> Array:
     unsure = steps * _left_open(known) * seen
     left_open = numbers[OPEN] + np.cumsum(unsure)
     left = total - numbers[BEGUN] - work
-    lost = np.abs(np.diff(left, prepend=numbers[TOTAL] - numbers[BEGUN] - numbers[WORK]))
     near = np.append(numbers[BESIDE] > 0, _beside_stops(account, rows, steps))
-    numbers[AT_STOPS] += float(lost[(lost > SURE * unsure) & (near[:-1] | near[1:])].sum())
+    if near.any():
+        lost = np.abs(np.diff(left, prepend=numbers[TOTAL] - numbers[BEGUN] - numbers[WORK]))
+        numbers[AT_STOPS] += float(lost[(lost > SURE * unsure) & (near[:-1] | near[1:])].sum())
     sure = np.where(np.abs(left) > SURE * left_open, left, 0.0)
     worst = int(np.argmax(np.abs(sure)))
     if abs(sure[worst]) > abs(numbers[WORST]):
@@ -104,6 +105,8 @@ def add_rows(account: Account, rows: Record, powers: Array) -> Array:
 def _breaks_between(account: Account, times: Array) -> Array:
     """(T - 1,) whether a function of time breaks or changes between each two of T times."""
     moments = np.sort(np.concatenate([account.system.model.functions.breaks[:, SINCE], account.moments]))
+    if not moments.size:
+        return np.zeros(times.size - 1, dtype=bool)
     count = np.searchsorted(moments, times, side="right")
     found: Array = np.diff(count) > 0
     return found
@@ -263,9 +266,10 @@ def _power(system: System, rows: Record, powers: Array) -> Array:
     own = [not _conserves(force) for force in forces_of(system.scene)]
     counted[: len(own)] = own
     total: Array = powers[:, counted].sum(axis=1)
-    for b, body in ((b, body) for b, body in enumerate(system.scene.bodies) if body.model.n):
-        rates = rows.v[:, system.layout.q_dot(b)]
-        total = total - np.einsum("ti,ij,tj->t", rates, damping_matrix(body.model, body.damping), rates)
+    for b, body in enumerate(system.scene.bodies):
+        if body.model.damping is not None or body.damping.any():
+            rates = rows.v[:, system.layout.q_dot(b)]
+            total = total - np.einsum("ti,ij,tj->t", rates, damping_matrix(body.model, body.damping), rates)
     return total
 
 

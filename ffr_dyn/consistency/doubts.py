@@ -29,7 +29,7 @@ from ffr_dyn.scene.force_kinds import forces_of
 from ffr_dyn.scene.forces.force import Force
 from ffr_dyn.scene.forces.places import BetweenAxes
 from ffr_dyn.scene.scene import Body, Scene, joint_of
-from ffr_prep.body import remembered
+from ffr_prep.body import least_inertia, remembered
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError
 
@@ -288,6 +288,8 @@ def _least(body: Body, moving: tuple[int, ...], q: Array) -> float:
     a rigid body is always the same."""
 
     def made() -> float:
+        if not q.size and (bound := least_inertia(body.model, moving)) > FAR:
+            return bound
         at = list(moving)
         M = mass_matrix(kept_integrals(body), q)[at][:, at]
         scale = 1.0 / np.sqrt(M.diagonal())

@@ -43,19 +43,23 @@ def unfollowed(system: System, work: Work, step: float, rows: Record) -> Lost | 
 def torn_open(system: System, work: Work, step: float) -> Lost | None:
     """Time and text of a joint that was open by too much at the end of a step."""
     opened, time = float(work.drift[PHI]), float(work.drift[MOMENT])
-    block, word = row_named(system, int(work.drift[OPENED])) if opened > 0 else (None, None)
-    if block is not None and word is not None and not opened <= LOST * _whole(system.scene, word):
-        how = f"{'not followed, ' * block.driver}open by {opened:.3g} {_unit(word)} at the end of a step"
-        text = (
-            f"at t = {time:.6g} s {_called(block)} is {how}: the motion "
-            f"between the steps is more than the method follows; use steps far shorter than {step:.3g} s"
-        )
-        return Lost(time, text)
-    return None
+    if not opened > LOST * min(1.0, _length(system.scene)):
+        return None  # whichever row it is
+    block, word = row_named(system, int(work.drift[OPENED]))
+    if opened <= LOST * _whole(system.scene, word):
+        return None
+    how = f"{'not followed, ' * block.driver}open by {opened:.3g} {_unit(word)} at the end of a step"
+    text = (
+        f"at t = {time:.6g} s {_called(block)} is {how}: the motion "
+        f"between the steps is more than the method follows; use steps far shorter than {step:.3g} s"
+    )
+    return Lost(time, text)
 
 
 def _spun(system: System, step: float, rows: Record) -> Lost | None:
     """Time and text of a body that turns by too much within a step."""
+    if step * 3**0.5 * np.abs(rows.v).max(initial=0.0) <= SPUN:
+        return None  # the three components of no angular velocity make so much
     speeds = angular_speeds(system.layout, rows.v)
     for b in np.flatnonzero(step * speeds.max(axis=0, initial=0.0) > SPUN)[:1].tolist():
         row = int(np.argmax(speeds[:, b]))
@@ -137,7 +141,12 @@ def row_named(system: System, row: int) -> tuple[Block, Word]:
 
 def _whole(scene: Scene, word: Word) -> float:
     """[m] or [rad], what a share of is meant."""
-    return (max(body.model.size for body in scene.bodies) or 1.0) if _unit(word) == "m" else 1.0
+    return _length(scene) if _unit(word) == "m" else 1.0
+
+
+def _length(scene: Scene) -> float:
+    """[m] of the largest body, which may be a point."""
+    return max(body.model.size for body in scene.bodies) or 1.0
 
 
 def _unit(word: Word) -> str:

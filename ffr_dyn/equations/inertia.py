@@ -100,6 +100,8 @@ def mass_matrix(body: FlexibleBody | Integrals, q: Array) -> Array:
     M, s = np.zeros((6 + q.size, 6 + q.size), moment.W.dtype), skew(moment.s)
     M[:3, :3].flat[::4] = body.mass
     M[:3, 3:6], M[3:6, :3], M[3:6, 3:6] = -s, s, inertia_tensor(moment)
+    if not q.size:
+        return M
     M[:3, 6:], M[3:6, 6:] = body.P_dm, axial(moment.G)
     M[6:, :6], M[6:, 6:] = M[:6, 6:].T, body.I6
     return M

@@ -156,6 +156,9 @@ def marker_directions(scene: Scene, place: Layout, x: Array, number: int, *axes:
     if b == len(scene.bodies):
         return [*axes]
     body, q = scene.bodies[b], x[place.q(b)]
+    if not q.size:
+        A = rotation_matrix(x[place.p(b)])
+        return [A @ a0 for a0 in axes]
     theta = body.model.interface(point).phi_r - 0.5 * (marker_matrices(body, point)[3:] @ q)
     turn, A = rotation_matrix(from_vector(theta @ q)), rotation_matrix(x[place.p(b)])
     return [A @ (turn @ a0) for a0 in axes]

@@ -7,6 +7,7 @@ need more memory than what is wanted of them, are computed as they come. The num
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Protocol
@@ -14,7 +15,7 @@ from typing import Protocol
 import numpy as np
 
 from ffr_dyn.compile.scene_tables import System
-from ffr_dyn.compile.workspace import new_record
+from ffr_dyn.compile.workspace import row_shapes
 from ffr_dyn.kernels.tables import Record
 from ffr_dyn.results.quantities import Entry, Memory, measure
 from ffr_dyn.results.recorded_motion import View
@@ -92,4 +93,4 @@ def _rows_of(quantity: Quantity, shown: Array) -> Quantity:
 
 def row_size(system: System) -> int:
     """Bytes of a row."""
-    return sum(column.nbytes for column in new_record(system, 1))
+    return 8 * sum(map(math.prod, row_shapes(system).values()))

@@ -8,10 +8,9 @@ from __future__ import annotations
 
 import fnmatch
 import re
-from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import astuple, dataclass
 from difflib import get_close_matches
-from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -41,6 +40,7 @@ from ffr_dyn.scene.scene import Scene, marker_names, markers, measured_body
 from ffr_dyn.scene.sensors import Measurement, SectionMeasurement, StressMeasurement
 from ffr_dyn.scene.stress_sensors import measured_modes
 from ffr_dyn.scene.surfaces import surface_of
+from ffr_prep.body import remembered
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 
@@ -102,18 +102,23 @@ def measure(view: View, last: Memory, wanted: Mapping[str, Entry] | None = None)
     return found, left
 
 
-def selected(system: System, outputs: Sequence[str] = ("default",)) -> dict[str, Entry]:
+def selected(system: System, outputs: Sequence[str] = ("default",)) -> Mapping[str, Entry]:
     """The entries of the catalogue that names or patterns such as "rod.*.position" ask for, in its order.
 
     "default" stands for `DEFAULT_OUTPUTS`. Raises InputError for a name or pattern that fits nothing.
     """
     if isinstance(outputs, str):
         raise InputError(f"outputs must be a list of names, not the text {outputs!r}; write [{outputs!r}]")
-    everything = catalogue(system)
+    if system.scene.measurements:
+        return _selected(catalogue(system), outputs)
+    return remembered(system.structure, ("selected", *outputs), lambda: _selected(catalogue(system), outputs))
+
+
+def _selected(everything: Mapping[str, Entry], outputs: Sequence[str]) -> dict[str, Entry]:
     wanted: set[str] = set()
     for pattern in outputs:
         patterns = DEFAULT_OUTPUTS if pattern == "default" else (pattern,)
-        fitting = {pattern} if pattern in everything else _fitting(patterns, tuple(everything))
+        fitting = {pattern} if pattern in everything else _fitting(patterns, everything)
         if not fitting:
             close = get_close_matches(pattern, everything, 3)
             known = f"did you mean {', '.join(close)}?" if close else f"there are: {', '.join(everything)}"
@@ -122,10 +127,9 @@ def selected(system: System, outputs: Sequence[str] = ("default",)) -> dict[str,
     return {name: entry for name, entry in everything.items() if name in wanted}
 
 
-@lru_cache(64)
-def _fitting(patterns: tuple[str, ...], names: tuple[str, ...]) -> frozenset[str]:
+def _fitting(patterns: Sequence[str], names: Iterable[str]) -> set[str]:
     """The names that fit one of the patterns."""
-    return frozenset(filter(re.compile("|".join(map(fnmatch.translate, patterns))).match, names))
+    return set(filter(re.compile("|".join(map(fnmatch.translate, patterns))).match, names))
 
 
 def needs_every_step(wanted: Iterable[str]) -> bool:
@@ -133,42 +137,19 @@ def needs_every_step(wanted: Iterable[str]) -> bool:
     return any(name.endswith(".work") for name in wanted)
 
 
-_KNOWN: dict[Hashable, dict[str, Entry]] = {}  # catalogues without the measurements, of the last structures
-_MOST, _MANY = 64, 2000  # catalogues, and entries of one that is not kept
-
-
 def catalogue(system: System) -> Mapping[str, Entry]:
     """Every quantity that can be had of a scene, by name.
 
     Scenes of one structure share their entries, which know bodies, joints and forces by number.
     """
-    key = _structure(system)
-    known = _KNOWN.get(key)
-    if known is None:
-        if len(_KNOWN) >= _MOST:
-            _KNOWN.clear()
-        parts = (_bodies, _markers, _reactions, _joint_coordinates, _forces, _powers, _totals)
-        known = {name: entry for part in parts for name, entry in part(system)}
-        if len(known) < _MANY:
-            _KNOWN[key] = known
+    known = remembered(system.structure, "catalogue", lambda: _catalogue(system))
     return {**known, **dict(_measurements(system))} if system.scene.measurements else known
 
 
-def _structure(system: System) -> Hashable:
-    """All that the entries of a scene are made of, but for its measurements."""
-    scene = system.scene
-    return (
-        marker_names(scene),
-        tuple(
-            (body.name, n, body.kept, body.frame and body.frame.model.n)
-            for body, n in zip(scene.bodies, system.layout.n, strict=True)
-        ),
-        tuple((block.name, block.markers) for block in system.blocks),
-        tuple((joint.name, joint.kind) for joint in scene.joints),
-        tuple((coupling.name, coupling.first, coupling.second) for coupling in scene.couplings),
-        tuple((force.name, force.place.measured, force.stores_energy) for force in forces_of(scene)),
-        tuple((one.name, isinstance(one, Driver) and (one.joint, one.coordinate)) for one in scene.drivers),
-    )
+def _catalogue(system: System) -> dict[str, Entry]:
+    """Without the measurements."""
+    parts = (_bodies, _markers, _reactions, _joint_coordinates, _forces, _powers, _totals)
+    return {name: entry for part in parts for name, entry in part(system)}
 
 
 Named = Iterator[tuple[str, Entry]]
@@ -202,13 +183,13 @@ _POSES = (
 def _elastic(system: System, b: int) -> Named:
     place, body = system.layout, system.scene.bodies[b]
     numbers, count = body.kept or (tuple(range(place.n[b])), place.n[b])
-    count = body.frame.model.n if body.frame else count
+    framed, count = body.frame is not None, body.frame.model.n if body.frame else count
     modes, unit, text = mode_axis(body.name, count), "m sqrt(kg)", "elastic coordinates (mass-normalised)"
 
     def column(unit: str, text: str, of: str, at: slice) -> Entry:
         def values(view: View) -> Array:
             recorded = getattr(view.record, of)[:, at]
-            return view.own_elastic(b, recorded) if body.frame else _spread(recorded, numbers, count)
+            return view.own_elastic(b, recorded) if framed else _spread(recorded, numbers, count)
 
         return _entry(unit, (modes,), text, values)
 

@@ -297,9 +297,13 @@ class View(Brief):
         return self._once(("frame", marker, frame.tobytes()), lambda: self._frame(marker, frame))
 
     def _frame(self, marker: int, frame: Array) -> Array:
-        A = self._once(("marker axes", marker), lambda: rotation_matrix(self._attitudes(marker)))
+        A = self._once(("marker axes", marker), lambda: self._marker_axes(marker))
         turned = A[:, :, 0, None] * frame[0] + A[:, :, 1, None] * frame[1] + A[:, :, 2, None] * frame[2]
-        return np.broadcast_to(turned, (self.rows, 3, 3))
+        return turned if len(turned) == self.rows else np.broadcast_to(turned, (self.rows, 3, 3))
+
+    def _marker_axes(self, marker: int) -> Array:
+        """(T, 3, 3); (1, 3, 3) on the ground."""
+        return rotation_matrix(self._attitudes(marker)) if self._owner(marker) else np.eye(3)[None]
 
     def frame_rate(self, marker: int, frame: Array) -> Array:
         """(T, 3, 3) time derivative of `frame`."""

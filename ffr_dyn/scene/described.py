@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any
-
-import numpy as np
 
 from ffr_dyn.functions.time_functions import is_zero
 from ffr_dyn.scene.couplings import Coupling, coupled
@@ -42,7 +41,8 @@ def described(scene: Scene) -> dict[str, Any]:
 
 
 def _length(scene: Scene) -> float:
-    return max((float(np.sqrt(np.trace(body.model.rr_dm) / body.model.mass)) for body in scene.bodies), default=0.0)
+    moments = ((sum(body.model.rr_dm.diagonal().tolist()), body.model.mass) for body in scene.bodies)
+    return max((math.sqrt(moment / mass) for moment, mass in moments), default=0.0)
 
 
 def _connections(scene: Scene) -> dict[str, Any]:

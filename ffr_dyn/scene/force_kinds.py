@@ -46,7 +46,8 @@ def kinds_in(table: str) -> tuple[Any, ...]:
 
 def forces_of(scene: AnyScene) -> list[Any]:
     """All applied loads but gravity, in the order in which they are applied and their powers are recorded: by rank."""
-    return sorted([*scene.loads, *scene.springs, *scene.forces], key=lambda force: force.place.rank)
+    every = [*scene.loads, *scene.springs, *scene.forces]
+    return sorted(every, key=lambda force: force.place.rank) if len(every) > 1 else every
 
 
 def kernels_of(scene: AnyScene) -> list[Any]:

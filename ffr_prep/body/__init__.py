@@ -18,7 +18,7 @@ from ffr_prep.body.file import content_hash, load_body, save_arrays, save_body, 
 from ffr_prep.body.frame_change import interface_motions, mass_of_motions
 from ffr_prep.body.mean_axis import FrameMarker, MeanAxisForm, idle_loads, mean_axis_form, mean_axis_surface
 from ffr_prep.body.mesh_error import MESH_ERROR, mesh_doubt, mesh_errors_of
-from ffr_prep.body.movable import immovable
+from ffr_prep.body.movable import immovable, least_inertia
 from ffr_prep.body.reduced import (
     SECTION_FORCES,
     TENSOR,
@@ -84,6 +84,7 @@ __all__ = [
     "immovable",
     "interface_motions",
     "largest_von_mises",
+    "least_inertia",
     "left_out_stress",
     "linear_surface",
     "load_body",

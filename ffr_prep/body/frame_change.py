@@ -49,12 +49,26 @@ def in_motions(body: FlexibleBody, Z: Array, omega2: Array, stiffening: Array | 
 # ---- what rigid and elastic motions have together ------------------------------------------------------------------
 
 
+def mass_of_rigid_motions(body: FlexibleBody) -> list[list[float]]:
+    """(6, 6) of translations and rotations about the axes of the body, as plain numbers."""
+    (x, y, z), (of_x, of_y, of_z), m = body.r_dm.tolist(), body.rr_dm.tolist(), body.mass
+    whole = of_x[0] + of_y[1] + of_z[2]
+    return [
+        [m, 0.0, 0.0, 0.0, z, -y],
+        [0.0, m, 0.0, -z, 0.0, x],
+        [0.0, 0.0, m, y, -x, 0.0],
+        [0.0, -z, y, whole - of_x[0], 0.0 - of_x[1], 0.0 - of_x[2]],
+        [z, 0.0, -x, 0.0 - of_y[0], whole - of_y[1], 0.0 - of_y[2]],
+        [-y, x, 0.0, 0.0 - of_z[0], 0.0 - of_z[1], whole - of_z[2]],
+    ]
+
+
 def mass_of_motions(body: FlexibleBody) -> Array:
     """(6 + n, 6 + n)."""
-    M, (x, y, z) = np.eye(6 + body.n), body.r_dm.tolist()
-    turned = np.array([[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]])
-    M[[0, 1, 2], [0, 1, 2]] = body.mass
-    M[:3, 3:6], M[3:6, :3], M[3:6, 3:6] = turned, turned.T, body.inertia
+    M = np.eye(6 + body.n)
+    M[:6, :6] = mass_of_rigid_motions(body)
+    if not body.n:
+        return M
     M[:3, 6:], M[3:6, 6:] = body.P_dm, body.I4
     M[6:, :6] = M[:6, 6:].T
     return M

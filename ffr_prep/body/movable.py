@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ffr_prep.body.frame_change import mass_of_motions
+from ffr_prep.body.frame_change import mass_of_motions, mass_of_rigid_motions
 from ffr_prep.body.reduced import FlexibleBody
 from ffr_prep.common.arrays import Array
 
@@ -34,14 +34,14 @@ def immovable(body: FlexibleBody, active: Sequence[int] = range(6)) -> str:
     >>> immovable(rod)
     'turning about x: it has none'
     """
-    M, rigid = mass_of_motions(body), list(active)
-    own, coupled = M[rigid][:, rigid], M[rigid, 6:]
-    heavy = math.sqrt(body.mass)
+    rigid, heavy = list(active), math.sqrt(body.mass)
     reach = math.sqrt(max(sum(body.rr_dm.diagonal().tolist()), 0.0)) or heavy
-    scale = np.array([heavy if c < 3 else reach for c in rigid])
+    sizes = [heavy if c < 3 else reach for c in rigid]
+    if not body.n and least_inertia(body, rigid, sizes) > _NOTHING:
+        return ""
+    M, scale = mass_of_motions(body), np.array(sizes)
+    own, coupled = M[rigid][:, rigid], M[rigid, 6:]
     scaled = own / np.outer(scale, scale)
-    if not body.n and (2 * scaled.diagonal() - np.abs(scaled).sum(axis=1)).min() > _NOTHING:
-        return ""  # no eigenvalue is less (Gershgorin)
     values, vectors = np.linalg.eigh(scaled)
     if values[0] <= _NOTHING:
         turning = np.array(rigid) >= 3  # what has a mass, and no inertia, turns about a line
@@ -55,6 +55,19 @@ def immovable(body: FlexibleBody, active: Sequence[int] = range(6)) -> str:
     worst = np.linalg.solve(root.T, ways[:, -1])
     motion = _MOTIONS[rigid[int(np.abs(worst).argmax())]]
     return f"{motion}: its modes take up {taken[-1]:.3g} times what the mass gives"
+
+
+def least_inertia(body: FlexibleBody, motions: Sequence[int], sizes: Sequence[float] = ()) -> float:
+    """A number below all eigenvalues of the mass matrix of some rigid motions, each over its size (Gershgorin).
+
+    sizes : by default those that make ones on the diagonal; where there are none the bound is zero
+    """
+    M = mass_of_rigid_motions(body)
+    if not sizes and min(M[a][a] for a in motions) <= 0:
+        return 0.0
+    size = dict(zip(motions, sizes or [math.sqrt(M[a][a]) for a in motions], strict=True))
+    rows = ([M[a][b] / (size[a] * size[b]) for b in motions] for a in motions)
+    return min(2 * row[k] - sum(map(abs, row)) for k, row in enumerate(rows))
 
 
 def _squared(A: Array) -> Array:

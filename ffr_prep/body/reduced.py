@@ -251,6 +251,8 @@ class FlexibleBody(Brief):
     @cached_property
     def size(self) -> float:
         """Largest extent of interfaces and surface along an axis of the body [m]; zero of a point."""
+        if len(self.interfaces) < 2 and self.surface is None:
+            return 0.0
         places = np.array([interface.position for interface in self.interfaces]).reshape(-1, 3)
         if self.surface is not None:
             places = np.concatenate([places, self.surface.points])
@@ -366,22 +368,22 @@ T = TypeVar("T")
 
 
 class _Memory(dict[Hashable, Any]):
-    """Of one body, which is immutable; not kept in files, copies and messages to other processes."""
+    """Of one body, or whatever else is immutable; not kept in files, copies and messages to other processes."""
 
     def __reduce__(self) -> Any:
         return _Memory, ()
 
 
-def remembered(body: FlexibleBody, key: Hashable, make: Callable[[], T]) -> T:
+def remembered(body: Any, key: Hashable, make: Callable[[], T]) -> T:
     """The value of `make()`, which depends on the body and `key` alone, computed once for each.
 
-    For what many scenes ask of one body: its forms in a plane, its tables. It lives as long as the body.
+    For what many scenes ask of one body: its forms in a plane, its tables. It lives as long as the body. Of other things that
+    do not change the same may be asked.
     """
-    memory: _Memory = vars(body).setdefault(_MEMORY, _Memory())
     try:
-        found: T = memory[key]
+        found: T = vars(body)[_MEMORY][key]
     except KeyError:
-        made = make()
+        made, memory = make(), vars(body).setdefault(_MEMORY, _Memory())
         if len(memory) >= _MOST:
             memory.clear()
         found = memory.setdefault(key, made)  # of two threads the first

@@ -20,9 +20,8 @@ from test_turned_stiffening import FIXED
 import ffr_dyn as fd
 from ffr_dyn.analyses.checkpoint import fingerprint
 from ffr_dyn.analyses.integration import integrate
-from ffr_dyn.closing import constraints
 from ffr_dyn.closing.constraints import constraints_of, rows_at
-from ffr_dyn.compile import elimination, row_tables, workspace
+from ffr_dyn.compile import elimination, row_tables, scene_tables
 from ffr_dyn.compile.engine import new_engine
 from ffr_dyn.consistency import across
 from ffr_dyn.consistency.assemble import assemble, flat_form
@@ -148,11 +147,9 @@ def digest(scene: Scene) -> str:
 
 def forget() -> None:
     """As in a new process, but for what bodies remember."""
-    across._KNOWN.clear()
-    workspace._BLANK.clear()
-    for function in (
-        elimination._eliminated, row_tables._pattern, workspace._rigid_inertia, constraints._entries, constructors._rigid
-    ):  # fmt: skip
+    for memory in (across._KNOWN, scene_tables._KNOWN):
+        memory.known.clear()
+    for function in (elimination._eliminated, row_tables._pattern, constructors._rigid):
         function.cache_clear()
 
 
