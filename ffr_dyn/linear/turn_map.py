@@ -19,7 +19,7 @@ from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.compile.workspace import new_record
 from ffr_dyn.consistency.evaluation import Evaluator, evaluate, evaluator
 from ffr_dyn.consistency.failure import failure
-from ffr_dyn.consistency.tangent import STEP, Chart, chart, length_of, sizes_of
+from ffr_dyn.consistency.tangent import STEP, Chart, chart, sizes_of
 from ffr_dyn.equations.layout import Layout, meets, moved, to_body_axes, to_global_axes
 from ffr_dyn.functions.rotation import rotation_matrix
 from ffr_dyn.functions.time_functions import evaluate as value_of
@@ -116,7 +116,7 @@ def after(of: Turns, x: Array, v: Array, *, rows: int = 1, later: float = 0.0) -
 
 def engine_of(of: Turns, x: Array, v: Array) -> Engine:
     """Memory for steps of the map from a state (x, v)."""
-    closed = gains(Projection(CLOSED * length_of(of.system)))
+    closed = gains(Projection(CLOSED * length_of(of.system.scene)))
     engine = new_engine(of.system, x, v, of.method, closed, start=of.near.time, spacing=of.method.step)
     engine.work.loads.reference[:] = of.near.at.work.loads.reference
     return engine
