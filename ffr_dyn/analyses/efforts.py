@@ -13,6 +13,7 @@ import numpy as np
 
 from ffr_dyn.compile.engine import with_model
 from ffr_dyn.consistency.evaluation import Evaluator
+from ffr_dyn.equations.layout import Layout, length_of, velocity_sizes
 from ffr_dyn.functions.operations import MULTIPLY
 from ffr_dyn.functions.time_functions import TimeFunction, constant, operation, piecewise
 from ffr_dyn.kernels.tables import LAW
@@ -87,6 +88,17 @@ def unit(effort: Effort) -> str:
     """Unit of the effort."""
     angular = effort.moment if isinstance(effort, MarkerEffort) else effort.coordinate == "angle"
     return "N m" if angular else "N"
+
+
+def work_of(scene: Scene, place: Layout, forces: Array) -> float:
+    """[N m] of the largest of the generalised forces (V,) in a motion by the size of a body."""
+    return float(np.abs(forces * velocity_sizes(scene, place)).max())
+
+
+def with_work(scene: Scene, efforts: tuple[Effort, ...], work: float) -> Array:
+    """(U,) [N, N m] efforts of about one work [N m] in a motion by the size of the scene, or by a radian: added to forces of
+    such a work they are not lost in its rounding, as one newton is beside the weight of a ship."""
+    return np.array([work if unit(effort) == "N m" else work / length_of(scene) for effort in efforts])
 
 
 def with_effort(scene: Scene, effort: Effort, times: Array, values: Array) -> Scene:

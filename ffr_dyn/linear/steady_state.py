@@ -25,7 +25,15 @@ import numpy as np
 
 from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.consistency.assemble import Assembled
-from ffr_dyn.consistency.evaluation import free_motions, locked, smallest_step, total_mass_matrix, unit_rows
+from ffr_dyn.consistency.evaluation import (
+    free_motions,
+    locked,
+    of_mass,
+    row_sizes,
+    smallest_step,
+    total_mass_matrix,
+    unit_rows,
+)
 from ffr_dyn.consistency.mobility import named_motion
 from ffr_dyn.consistency.tangent import sizes_of
 from ffr_dyn.equations.forces import At, applied_by
@@ -53,7 +61,9 @@ TOLERANCE = 1e-9  # of its last step, rad or relative to the scene: the next wou
 LARGEST = 0.5  # of a step, the same
 NEAR = 0.01  # the same, of steps that lead to no other steady motion
 LEAST_SHARE = 0.01  # of the speed, by which it is followed
-BALANCED = 1e-13  # of forces relative to all, and of rows [m, -]: what is left of a balance by rounding
+BALANCED = (
+    1e-13  # of forces relative to all, and of rows relative to their sizes: what is left of a balance by rounding
+)
 NEUTRAL = 1e-13  # of a stiffness relative to the largest: rounding
 UNBALANCED = 1e-6  # of forces along motions without stiffness, relative to all
 VARIES, OPENS = 1e-7, 1e-7  # of forces and stiffness over a turn, relative; of rows, relative to the scene
@@ -359,8 +369,9 @@ def _in_screw(found: Steady, b: int) -> Machine | None:
     count = len(machine.screws.w)
     screws = Screws(np.tile(machine.screws.u[b], (count, 1)), np.tile(machine.screws.w[b], (count, 1)))
     change = to_body_axes(place, found.x, velocities(place, screws, found.x) - found.v)
-    across = np.abs(found.about.jacobian @ change).max(initial=0.0)
-    largest = float(np.abs(change / sizes_of(machine.system)).max())
+    size, J = sizes_of(machine.system), found.about.jacobian
+    across = (np.abs(J @ change) / row_sizes(J, size)).max(initial=0.0)
+    largest = float(np.abs(change / size).max())
     return replace(machine, screws=screws) if largest and across <= OPENS * largest else None
 
 
@@ -501,7 +512,8 @@ def _leapt(lengths: Sequence[float]) -> bool:
 def _balanced(found: Steady) -> bool:
     """Whether nothing is left to do but rounding, as of what is straight at its critical speed."""
     left = np.abs(found.Z.T @ found.about.forces).max(initial=0.0)
-    open_rows = np.abs(found.about.Phi).max(initial=0.0)
+    reach = row_sizes(found.about.jacobian, sizes_of(found.machine.system))
+    open_rows = (np.abs(found.about.Phi) / reach).max(initial=0.0)
     return bool(left <= BALANCED * _size_of_forces(found) and open_rows <= BALANCED)
 
 
@@ -509,8 +521,11 @@ def _multipliers(about: Matrices, forces: Array) -> Array:
     """(C,) of the rows, that leave the least of the forces (V,) in the norm of the inverse mass matrix."""
     if not len(about.jacobian):
         return np.zeros(0)
-    yielding = np.linalg.solve(about.M, about.jacobian.T)
-    return np.linalg.lstsq(about.jacobian @ yielding, yielding.T @ forces, rcond=None)[0]
+    rows = of_mass(about.M, about.jacobian.T)
+    length = np.linalg.norm(rows, axis=0)
+    rows = rows / (unit := np.where(length > 0, length, 1.0))  # alike: those of a small machine differ by its size
+    found: Array = np.linalg.lstsq(rows.T @ rows, rows.T @ of_mass(about.M, forces), rcond=None)[0] / unit
+    return found
 
 
 def _solved(near: Steady, forces: Array) -> Array:
@@ -562,7 +577,7 @@ def _require_balance(found: Steady) -> None:
 def _size_of_forces(found: Steady) -> float:
     """Of all forces, or of those that would hold the scene's mass at its size from the axis; in the free motions' units."""
     about, machine = found.about, found.machine
-    applied = np.abs(np.linalg.solve(np.linalg.cholesky(about.M), about.forces)).max()
+    applied = np.abs(of_mass(about.M, about.forces)).max()
     held = machine.screws.fastest**2 * (sizes_of(machine.system) * np.sqrt(np.diag(about.M))).max()
     return float(max(applied, held)) or 1.0
 
@@ -582,16 +597,17 @@ def _not_lasting(found: Steady) -> InputError | None:
     machine, x = _later(found)
     about = matrices(machine, x, found.about.lam)
     size = sizes_of(machine.system)
-    opened = np.abs(about.Phi)
+    reach = row_sizes(about.jacobian, size)
+    opened = np.abs(about.Phi) / reach
     turned = np.abs(about.jacobian @ (found.Z / np.abs(found.Z / size[:, None]).max(axis=0, initial=1e-300))).max(
         axis=1, initial=0.0
     )
-    bad, limit = np.maximum(opened, turned), OPENS * max(1.0, float(size.max()))
-    if bad.max(initial=0.0) <= limit:
+    bad = np.maximum(opened, turned / reach)
+    if bad.max(initial=0.0) <= OPENS:
         return None
     names = [block.name for block in machine.system.blocks for _ in block.words]
     worst = int(np.argmax(bad[: len(names)])) if names else 0
-    if opened.max(initial=0.0) <= limit:
+    if opened.max(initial=0.0) <= OPENS:
         return InputError(
             f"about the steady motion {names[worst]!r} lets bodies that turn at different speeds move aside together, which "
             "has no constant axes: put a stiff Bushing in its place, which may turn freely, or take `periodic` with floquet"

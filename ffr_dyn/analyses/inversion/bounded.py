@@ -150,7 +150,9 @@ def _found(of: Plant, times: Array, path: Path, parts: int) -> Found:
         look(of, float(t), *w)
         for t, *w in zip(times[keep], path.y[keep], rates[keep], path.u[keep], path.near[keep], strict=True)
     ]
-    return Found(path.u[keep] * of.own.units.efforts, [(now.x, now.v) for now in looks], [now.measured for now in looks])
+    return Found(
+        path.u[keep] * of.own.units.efforts, [(now.x, now.v) for now in looks], [now.measured for now in looks]
+    )
 
 
 def _whole(span: float, output_step: float) -> int:
@@ -230,8 +232,9 @@ def _require_rest(of: Plant, *ends: _End) -> None:
         speed, change = (np.abs(row[own.known]) for row in (rows.nu, rows.gamma))
         if np.max(np.maximum(speed, change * own.lasts) * own.lasts / own.units.known, initial=0.0) > REST:
             raise InputError(
-                f"at t = {time:.6g} s a known motion is not at rest (speed {speed.max():.3g}, acceleration {change.max():.3g}): the "
-                "bounded solution needs one that starts and ends at rest; give it ends where both are zero"
+                f"at t = {time:.6g} s a known motion is not at rest (speed {speed.max():.3g}, acceleration "
+                f"{change.max():.3g}): the bounded solution needs one that starts and ends at rest; give it ends where both "
+                "are zero"
             )
 
 

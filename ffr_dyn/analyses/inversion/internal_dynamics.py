@@ -136,7 +136,9 @@ def _moved(of: Plant, y_ddot: Array, x: Array) -> str:
     """The effect of accelerations y_ddot (D,) at rest on joint coordinates, the largest first, and on the coordinates y."""
     own, place = of.own, of.own.at.system.layout
     names, gradients = coordinate_gradients(own.at.system.scene, place, x, np.zeros(place.v_size))
-    moved = np.concatenate([gradients @ (motions(of, own.span[0], x) @ y_ddot), (y_ddot * own.units.y)[own.inner.size :]])
+    moved = np.concatenate(
+        [gradients @ (motions(of, own.span[0], x) @ y_ddot), (y_ddot * own.units.y)[own.inner.size :]]
+    )
     said = [*names, *own.names[own.inner.size :]]
     largest = np.argsort(-np.abs(moved))[:4]
     if not np.abs(moved).max(initial=0.0) > 0:

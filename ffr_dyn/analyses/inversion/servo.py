@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg import qr
 
-from ffr_dyn.analyses.efforts import Effort, sized, unit
+from ffr_dyn.analyses.efforts import Effort, sized, with_work, work_of
 from ffr_dyn.analyses.inversion.turns import Angle, angles_of, count_turns
 from ffr_dyn.compile.engine import with_model
 from ffr_dyn.compile.scene_tables import compile_scene
@@ -30,6 +30,8 @@ from ffr_dyn.consistency.evaluation import (
     evaluator,
     free_motions,
     locked,
+    of_mass,
+    row_sizes,
     total_mass_matrix,
     unit_rows,
 )
@@ -216,7 +218,7 @@ def _units(
     the start, or moves the machine by its size in the time that the known motions last [s]."""
     place = layout(scene)
     length, sizes = length_of(scene), velocity_sizes(scene, place)
-    work = (length / lasts) ** 2 * sum(body.model.mass for body in scene.bodies) + float(np.abs(forces * sizes).max())
+    work = (length / lasts) ** 2 * sum(body.model.mass for body in scene.bodies) + work_of(scene, place, forces)
     joints = [1.0 if name.endswith(".angle") else length for name in names[: len(names) - elastic.size]]
     return Units(
         length,
@@ -224,7 +226,7 @@ def _units(
         _of_one_energy(scene, place, sizes),
         np.concatenate([joints, sizes[elastic]]),
         np.array([1.0 if row.kind == DRIVEN_ANGLE else length for row in known]),
-        np.array([work if unit(effort) == "N m" else work / length for effort in unknown]),
+        with_work(scene, unknown, work),
     )
 
 
@@ -251,7 +253,7 @@ def _internal(
     elastic = [int(k) for b in range(len(place.n)) for k in np.arange(place.v_size)[place.q_dot(b)]]
     labels = [f"{scene.bodies[b].name}.q.{k + 1}" for b in range(len(place.n)) for k in range(place.n[b])]
     candidates = np.concatenate([gradients, unit_rows(np.array(elastic, int), place.v_size)])
-    length = np.linalg.norm(np.linalg.solve(np.linalg.cholesky(M), candidates.T), axis=0)
+    length = np.linalg.norm(of_mass(M, candidates.T), axis=0)
     _, R, order = qr((candidates @ Z / length[:, None]).T, pivoting=True, mode="economic")
     d = Z.shape[1]
     if d and (R.shape[1] < d or np.abs(np.diag(R)).min() < 1e-6):
@@ -331,7 +333,7 @@ def placed(own: ServoMotion, at: Evaluator, time: float, w: Array, x: Array) -> 
     for _ in range(ITERATIONS):
         now = evaluate(at, time, x, still)
         Phi, off = now.Phi[own.held], wanted - x[slots]
-        allowed = TOLERANCE * (np.abs(now.jacobian[own.held]) @ own.units.sizes)
+        allowed = TOLERANCE * row_sizes(now.jacobian[own.held], own.units.sizes)
         held = bool(np.abs(off / bending).max(initial=0.0) < TOLERANCE)
         if held and (np.abs(Phi) <= allowed).all():
             return x, now
