@@ -37,10 +37,10 @@ from ffr_dyn.consistency.evaluation import (
 from ffr_dyn.consistency.mobility import named_motion
 from ffr_dyn.consistency.tangent import sizes_of
 from ffr_dyn.equations.forces import At, applied_by
-from ffr_dyn.equations.forces_at_rest import Watched
+from ffr_dyn.equations.forces_at_rest import Watched, damping_of
 from ffr_dyn.equations.forces_in_motion import add_velocities
 from ffr_dyn.equations.inertia import kept_integrals
-from ffr_dyn.equations.layout import Layout, moved, to_body_axes, to_global_axes
+from ffr_dyn.equations.layout import Layout, moved, to_body_axes, to_global_axes, velocity_sizes
 from ffr_dyn.equations.placed import Sums, all_placed, nothing_on
 from ffr_dyn.equations.spinning import spinning
 from ffr_dyn.equations.statics import balance, damping
@@ -75,7 +75,7 @@ PHASES = 8  # of a turn, over which a mean is taken
 TURNS = 16  # of the fastest body, at most, over which it is taken where others have turned by whole turns as well
 SAME = 1e-6  # of a state that is in its steady motion: of velocities and forces, relative
 TURNED = 1.0  # rad: how far on the scene is looked at again
-STEP = 1e-4  # m, rad: of differences, extrapolated
+STEP = 1e-4  # rad, or relative to the bodies: of differences, extrapolated
 
 
 @dataclass(frozen=True)
@@ -271,7 +271,8 @@ def _looks(now: At, force: Force) -> bool:
 
 def _add_by_differences(total: Sums, D: Array, screws: Screws, now: At, force: Force) -> None:
     """Add the part that velocities have in a force of any kind, in its tangent and in the damping (V, V)."""
-    place, still = now.place, np.zeros(now.v.size)
+    place, still, sizes = now.place, np.zeros(now.v.size), velocity_sizes(now.scene, now.place)
+    pace = float(np.abs(now.v / sizes).max())
 
     def given(at: At) -> Array:
         return applied_by(at, force).generalised
@@ -281,22 +282,22 @@ def _add_by_differences(total: Sums, D: Array, screws: Screws, now: At, force: F
         moving = replace(now, x=there, v=velocities(place, screws, there))
         return given(moving) - given(replace(moving, v=still))
 
-    def rated(of: Array) -> Array:
-        return _derivative(lambda rate: given(replace(now, v=of + to_global_axes(place, now.x, rate))), 1.0, still.size)
+    def rated(rate: Array) -> Array:
+        return given(replace(now, v=now.v + to_global_axes(place, now.x, rate)))
 
     here = added(still)
     total.forces[:] += here
-    total.tangent[:] += _derivative(added, STEP, still.size)
+    total.tangent[:] += _derivative(added, STEP * sizes)
     for b in range(len(place.n)):  # they are in the axes of bodies that are moved, the tangent is in those at x
         shift, turn = place.R_dot(b), place.omega(b)
         total.tangent[shift, turn] -= skew(here[shift])
         total.tangent[turn, turn] -= 0.5 * skew(here[turn])
-    D += rated(still) - rated(now.v)
+    D -= damping_of(total, replace(now, v=still), force) + _derivative(rated, pace * sizes)
 
 
-def _derivative(function: Callable[[Array], Array], step: float, size: int) -> Array:
-    """(V, V) derivative of V = size numbers by as many at zero, by extrapolated central differences."""
-    return differences(function, np.full(size, step), range(size))[0]
+def _derivative(function: Callable[[Array], Array], steps: Array) -> Array:
+    """(V, V) derivative of V numbers by as many at zero, by extrapolated central differences of steps (V,)."""
+    return differences(function, steps, range(steps.size))[0]
 
 
 # ---- the balance ----------------------------------------------------------------------------------------------------
