@@ -349,15 +349,15 @@ def inputs_and_outputs(
     """B, C, D about a chart's state."""
     v = to_global_axes(near.at.system.layout, near.x, near.V)
     now = evaluate(near.at, near.time, near.x, v)
-    amounts = _amounts(near, scene, inputs, np.maximum(np.abs(now.force), np.abs(near.M @ now.acceleration)))
+    amounts = _amounts(near, scene, inputs, np.abs(now.force) + np.abs(near.M @ now.acceleration))
     B = _columns(lambda u: rates(_fed(near, scene, inputs, u), near.x, v), amounts)
     return B, *_output_matrices(near, scene, inputs, outputs, amounts)
 
 
-def _amounts(near: Chart, scene: Scene, inputs: tuple[Effort | str, ...], forces: Array) -> Array:
-    """(U,) of inputs that are not lost beside the forces (V,) of the scene, inertia included."""
-    here, place = near.at.system.scene, near.at.system.layout
-    work = work_of(here, place, forces) or 1.0
+def _amounts(near: Chart, scene: Scene, inputs: tuple[Effort | str, ...], inertia: Array) -> Array:
+    """(U,) of inputs that are not lost beside the forces of the scene and its inertia (V,)."""
+    here, place = without(near.at.system.scene, _efforts(inputs)), near.at.system.layout
+    work = work_of(At(here, place, near.time, near.x, to_global_axes(place, near.x, near.V)), inertia) or 1.0
     weight = length_of(here) * sum(body.model.mass for body in here.bodies)
     found = np.array([work / weight if isinstance(item, str) and _is_base(scene, item) else 1.0 for item in inputs])
     efforts = np.array([not isinstance(item, str) for item in inputs], bool)

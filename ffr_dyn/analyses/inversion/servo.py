@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg import qr
 
-from ffr_dyn.analyses.efforts import Effort, sized, with_work, work_of
+from ffr_dyn.analyses.efforts import Effort, sized, with_work, without, work_of
 from ffr_dyn.analyses.inversion.turns import Angle, angles_of, count_turns
 from ffr_dyn.compile.engine import with_model
 from ffr_dyn.compile.scene_tables import compile_scene
@@ -38,9 +38,9 @@ from ffr_dyn.consistency.evaluation import (
 from ffr_dyn.consistency.mobility import coordinate_gradients, coordinate_word
 from ffr_dyn.equations.constraint_rows import Block
 from ffr_dyn.equations.constraints import evaluate_word
+from ffr_dyn.equations.forces import At
 from ffr_dyn.equations.layout import (
     Layout,
-    layout,
     length_of,
     meets,
     moved,
@@ -175,7 +175,8 @@ def _in_coordinates(
     data = system.model.functions.start[rows.function[inner_rows]]
     at = _owning(sized(evaluator(system), unknown, np.zeros(len(unknown))))
     guides = [word for name in known for block in ordered if block.name == name for word in block.words]
-    units = _units(scene, unknown, guides, names, np.array(elastic, int), now.force, span[1] - span[0])
+    start = At(without(scene, unknown), assembled.system.layout, span[0], assembled.x, assembled.v)
+    units = _units(start, unknown, guides, names, np.array(elastic, int), span[1] - span[0])
     own = ServoMotion(
         at, unknown, plant_rows, known_rows, inner_rows, held, np.array(elastic, int), data, span, names, units
     )
@@ -198,27 +199,26 @@ def rows_of(blocks: list[Block], names: tuple[str, ...]) -> Array:
     return np.concatenate([at[name] for name in names] or [np.zeros(0)]).astype(int)
 
 
-def effort_columns(own: ServoMotion, at: Evaluator, state: tuple[float, Array, Array], without: Array) -> Array:
-    """(V, U) generalised forces of efforts of one of their units at a state (time, x, v), by the forces (V,) without them:
+def effort_columns(own: ServoMotion, at: Evaluator, state: tuple[float, Array, Array], alone: Array) -> Array:
+    """(V, U) generalised forces of efforts of one of their units at a state (time, x, v), by the forces (V,) alone:
     exact, since efforts enter linearly."""
-    forces = [evaluate(sized(at, own.unknown, one), *state).force - without for one in np.diag(own.units.efforts)]
-    return np.array(forces).reshape(len(own.unknown), without.size).T
+    forces = [evaluate(sized(at, own.unknown, one), *state).force - alone for one in np.diag(own.units.efforts)]
+    return np.array(forces).reshape(len(own.unknown), alone.size).T
 
 
 def _units(
-    scene: Scene,
+    start: At,
     unknown: tuple[Effort, ...],
     known: list[Word],
     names: tuple[str, ...],
     elastic: Array,
-    forces: Array,
     lasts: float,
 ) -> Units:
-    """Of joint coordinates by their names, and elastic ones by their numbers in v. An effort of one holds the forces (V,) at
-    the start, or moves the machine by its size in the time that the known motions last [s]."""
-    place = layout(scene)
-    length, sizes = length_of(scene), velocity_sizes(scene, place)
-    work = (length / lasts) ** 2 * sum(body.model.mass for body in scene.bodies) + work_of(scene, place, forces)
+    """Of joint coordinates by their names, and elastic ones by their numbers in v. An effort of one does the work of the
+    forces at the start, or moves the machine by its size in the time that the known motions last [s]."""
+    scene, place, length = start.scene, start.place, length_of(start.scene)
+    sizes = velocity_sizes(scene, place)
+    work = (length / lasts) ** 2 * sum(body.model.mass for body in scene.bodies) + work_of(start, 0 * start.v)
     joints = [1.0 if name.endswith(".angle") else length for name in names[: len(names) - elastic.size]]
     return Units(
         length,
