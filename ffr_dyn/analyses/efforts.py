@@ -13,6 +13,8 @@ import numpy as np
 
 from ffr_dyn.compile.engine import with_model
 from ffr_dyn.consistency.evaluation import Evaluator
+from ffr_dyn.equations.forces import At, applied_by
+from ffr_dyn.equations.layout import length_of, velocity_sizes
 from ffr_dyn.functions.operations import MULTIPLY
 from ffr_dyn.functions.time_functions import TimeFunction, constant, operation, piecewise
 from ffr_dyn.kernels.tables import LAW
@@ -87,6 +89,24 @@ def unit(effort: Effort) -> str:
     """Unit of the effort."""
     angular = effort.moment if isinstance(effort, MarkerEffort) else effort.coordinate == "angle"
     return "N m" if angular else "N"
+
+
+def work_of(now: At, inertia: Array) -> float:
+    """[N m] of the largest generalised force in a motion by the size of a body: of forces, weights, springs within bodies and
+    `inertia` (V,), which may be in balance."""
+    scene, place, total = now.scene, now.place, np.abs(inertia)
+    for force in forces_of(scene):
+        total = total + np.abs(applied_by(now, force).generalised)
+    for b, body in enumerate(scene.bodies):
+        total[place.R_dot(b)] += body.model.mass * np.linalg.norm(scene.gravity)
+        total[place.q_dot(b)] += body.model.omega2 * np.abs(now.x[place.q(b)])
+    return float((total * velocity_sizes(scene, place)).max())
+
+
+def with_work(scene: Scene, efforts: tuple[Effort, ...], work: float) -> Array:
+    """(U,) [N, N m] efforts of about one work [N m] in a motion by the size of the scene, or by a radian: added to forces of
+    such a work they are not lost in its rounding, as one newton is beside the weight of a ship."""
+    return np.array([work if unit(effort) == "N m" else work / length_of(scene) for effort in efforts])
 
 
 def with_effort(scene: Scene, effort: Effort, times: Array, values: Array) -> Scene:

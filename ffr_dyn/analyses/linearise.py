@@ -15,7 +15,7 @@ from typing import Any, ClassVar, get_args
 
 import numpy as np
 
-from ffr_dyn.analyses.efforts import Effort, sized, with_units, without
+from ffr_dyn.analyses.efforts import Effort, sized, with_units, with_work, without, work_of
 from ffr_dyn.analyses.outcome import result_of
 from ffr_dyn.analyses.registry import OfMoment, option
 from ffr_dyn.analyses.rotating.steady import steady
@@ -30,7 +30,7 @@ from ffr_dyn.consistency.evaluation import Evaluator, evaluate, evaluator
 from ffr_dyn.consistency.kinks import kinked_forces
 from ffr_dyn.consistency.tangent import STEP, Chart, at_rest, chart, derivative, rates, sizes, state, state_matrix
 from ffr_dyn.equations.forces import At
-from ffr_dyn.equations.layout import to_global_axes
+from ffr_dyn.equations.layout import length_of, to_global_axes
 from ffr_dyn.kernels.tables import LAW
 from ffr_dyn.linear.eigen import NULL, eigen
 from ffr_dyn.linear.matrices import Modes, graded, modes_of, reduced
@@ -313,7 +313,9 @@ def _notes(near: Chart, steady: Steady | None, A: Array, rounding: Array | None)
         rounding = np.full(d, NULL * max(1.0, float(np.abs(A[d:, :d]).max(initial=0.0))))
     left = near.Z @ np.where(np.abs(left) > rounding * near.steps / STEP, left, 0.0) / sizes(at)
     applied = np.linalg.solve(near.M, evaluate(at, near.time, near.x, v).force) / sizes(at)
-    if np.abs(left).max() <= STATIONARY * max(float(np.abs(applied).max()), float(np.abs(near.V).max()) ** 2):
+    if np.abs(left).max() <= STATIONARY * max(
+        float(np.abs(applied).max()), float(np.abs(near.V / sizes(at)).max()) ** 2
+    ):
         return []
     return ["the state is no equilibrium and no steady rotation: the eigenvalues describe its next moment only"]
 
@@ -347,14 +349,27 @@ def inputs_and_outputs(
 ) -> tuple[Array, Array, Array]:
     """B, C, D about a chart's state."""
     v = to_global_axes(near.at.system.layout, near.x, near.V)
-    B = _columns(lambda u: rates(_fed(near, scene, inputs, u), near.x, v), len(inputs))
-    return B, *_output_matrices(near, scene, inputs, outputs)
+    now = evaluate(near.at, near.time, near.x, v)
+    amounts = _amounts(near, scene, inputs, np.abs(now.force) + np.abs(near.M @ now.acceleration))
+    B = _columns(lambda u: rates(_fed(near, scene, inputs, u), near.x, v), amounts)
+    return B, *_output_matrices(near, scene, inputs, outputs, amounts)
 
 
-def _columns(function: Callable[[Array], Array], count: int) -> Array:
-    """d function / d u: exact, since the efforts enter linearly."""
-    zero = function(np.zeros(count))
-    return np.array([function(unit) - zero for unit in np.eye(count)]).reshape(count, zero.size).T
+def _amounts(near: Chart, scene: Scene, inputs: tuple[Effort | str, ...], inertia: Array) -> Array:
+    """(U,) of inputs that are not lost beside the forces of the scene and its inertia (V,)."""
+    here, place = without(near.at.system.scene, _efforts(inputs)), near.at.system.layout
+    work = work_of(At(here, place, near.time, near.x, to_global_axes(place, near.x, near.V)), inertia) or 1.0
+    weight = length_of(here) * sum(body.model.mass for body in here.bodies)
+    found = np.array([work / weight if isinstance(item, str) and _is_base(scene, item) else 1.0 for item in inputs])
+    efforts = np.array([not isinstance(item, str) for item in inputs], bool)
+    found[efforts] = with_work(here, _efforts(inputs), work)
+    return found
+
+
+def _columns(function: Callable[[Array], Array], amounts: Array) -> Array:
+    """d function / d u by u of these amounts (U,): exact, since the efforts enter linearly."""
+    zero = function(np.zeros(amounts.size))
+    return np.array([(function(u) - zero) / u.sum() for u in np.diag(amounts)]).reshape(amounts.size, zero.size).T
 
 
 def _fed(near: Chart, scene: Scene, inputs: tuple[Effort | str, ...], u: Array) -> Chart:
@@ -397,7 +412,7 @@ def _load_number(scene: Scene, name: str) -> int:
 
 
 def _output_matrices(
-    near: Chart, scene: Scene, inputs: tuple[Effort | str, ...], outputs: tuple[str, ...]
+    near: Chart, scene: Scene, inputs: tuple[Effort | str, ...], outputs: tuple[str, ...], amounts: Array
 ) -> tuple[Array, Array]:
     d = near.steps.size
     quantities = quantities_of(near, outputs)
@@ -414,7 +429,7 @@ def _output_matrices(
     turns, here = np.array([name.endswith(".angle") for name in outputs]), np.zeros(len(outputs))
     here = measured(near, np.zeros(2 * d))  # angles are told within half a turn; these go on from here
     C, _ = derivative(lambda deviation: measured(near, deviation), np.concatenate([near.steps, near.steps]))
-    return C, _columns(lambda u: measured(_fed(near, scene, inputs, u), np.zeros(2 * d)), len(inputs))
+    return C, _columns(lambda u: measured(_fed(near, scene, inputs, u), np.zeros(2 * d)), amounts)
 
 
 def quantities_of(near: Chart, outputs: tuple[str, ...]) -> list[str]:

@@ -335,9 +335,10 @@ def _integrated(
     def right(t: float, w: Array) -> Array:
         return slope(own, t, w, moments[-1].x)[0]
 
+    least = 1e-2 * causal.tolerance * np.repeat([1.0, 1.0 / own.lasts], own.size)
     for before, time in pairwise(times):
         if own.size:
-            solver = DOP853(right, float(before), w, float(time), rtol=causal.tolerance, atol=causal.tolerance * 1e-2)
+            solver = DOP853(right, float(before), w, float(time), rtol=causal.tolerance, atol=least)
             while solver.status == "running":
                 solver.step()
                 creeps = solver.status == "running" and solver.step_size < SHORTEST * (time - before)

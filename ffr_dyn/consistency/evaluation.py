@@ -10,13 +10,22 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy.linalg import solve_triangular
 
 from ffr_dyn.compile.engine import Engine, new_engine, record_row
 from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.compile.workspace import new_record
 from ffr_dyn.consistency.failure import failure
 from ffr_dyn.equations.inertia import kept_integrals, mass_matrix
-from ffr_dyn.equations.layout import Layout, initial_state, meets, moved, to_body_axes, to_global_axes
+from ffr_dyn.equations.layout import (
+    Layout,
+    initial_state,
+    meets,
+    moved,
+    to_body_axes,
+    to_global_axes,
+    velocity_sizes,
+)
 from ffr_dyn.functions.rotation import skew
 from ffr_dyn.kernels.simd.table_address import pack
 from ffr_dyn.kernels.tables import IN_Q, IN_SHARED, OK, SINGULAR_CONSTRAINT, Record, Work
@@ -220,16 +229,34 @@ def _weights(M: Array) -> Array:
         ) from None
 
 
+def _lowered(lower: Array, right: Array) -> Array:
+    """The inverse of a triangle on a right-hand side, by substitution: rows of kg, kg m^2 and of elastic coordinates, which
+    differ by any factor in a small machine, are not weighed against each other."""
+    found: Array = solve_triangular(lower, right, lower=True, check_finite=False)
+    return found
+
+
+def _raised(lower: Array, right: Array) -> Array:
+    """The same of the transposed triangle."""
+    found: Array = solve_triangular(lower, right, lower=True, trans="T", check_finite=False)
+    return found
+
+
+def of_mass(M: Array, forces: Array) -> Array:
+    """(V, ...) forces (V, ...) in the norm of the inverse mass matrix. Raises as `free_motions`."""
+    return _lowered(_weights(M), forces)
+
+
 def free_motions(jacobian: Array, M: Array) -> Array:
     """(V, d) with jacobian Z = 0 and Z^T M Z = 1: all motions that the rows leave free."""
     lower = _weights(M)
     if jacobian.shape[0] == 0:
-        return np.linalg.inv(lower).T
-    weighted = np.linalg.solve(lower, jacobian.T).T
+        return _raised(lower, np.eye(len(lower)))
+    weighted = _lowered(lower, jacobian.T).T
     length = np.linalg.norm(weighted, axis=1)
     _, values, basis = np.linalg.svd(weighted / np.where(length > 0, length, 1.0)[:, None])
     rank = int((values > RANK_TOLERANCE * values.max(initial=0.0)).sum())
-    return np.linalg.solve(lower.T, basis[rank:].T)
+    return _raised(lower, basis[rank:].T)
 
 
 def smallest_step(jacobian: Array, M: Array, target: Array, tolerance: float = RANK_TOLERANCE) -> Array:
@@ -238,15 +265,28 @@ def smallest_step(jacobian: Array, M: Array, target: Array, tolerance: float = R
     tolerance : how small a combination of rows of length one is left out, over the largest
     """
     lower = _weights(M)
-    weighted = np.linalg.solve(lower, jacobian.T).T
+    weighted = _lowered(lower, jacobian.T).T
     length = np.linalg.norm(weighted, axis=1)
     length = np.where(length > 0, length, 1.0)
     unit = np.linalg.lstsq(weighted / length[:, None], target / length, rcond=tolerance)[0]
-    return np.linalg.solve(lower.T, unit)
+    return _raised(lower, unit)
+
+
+def row_sizes(jacobian: Array, sizes: Array) -> Array:
+    """(C,) by how much rows [m, -] change at most where all moves by its size (V,); one of rows that nothing moves."""
+    found = np.abs(jacobian) @ sizes
+    return np.where(found > 0, found, 1.0)
+
+
+def rows_close(at: Evaluator, x: Array, now: Evaluation, tolerance: float) -> bool:
+    """Whether the rows of a position (X,) vanish to a tolerance, relative to their sizes, or to rounding."""
+    scene, place = at.system.scene, at.system.layout
+    allowed = tolerance * row_sizes(now.jacobian, velocity_sizes(scene, place))
+    return bool((np.abs(now.Phi) <= allowed).all()) or meets(scene, x, now.Phi, 0.0)
 
 
 NO_INERTIA = 1e-9  # of the largest inertia, in place of none
-CLOSED = 1e-12  # of Phi [m, -] after a projection
+CLOSED = 1e-12  # of rows after a projection, relative to their sizes
 
 
 CORRECTIONS = 10
@@ -263,7 +303,7 @@ def closed(at: Evaluator, time: float, x: Array, v: Array) -> tuple[Array, Array
     x = moved(place, x, np.zeros(place.v_size))
     for _ in range(CORRECTIONS):
         now = evaluate(at, time, x, v)
-        if meets(at.system.scene, x, now.Phi, CLOSED):
+        if rows_close(at, x, now, CLOSED):
             break
         x = moved(place, x, smallest_step(now.jacobian, evaluated_mass_matrix(at), -now.Phi))
     else:

@@ -17,7 +17,7 @@ import numpy as np
 from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.consistency.evaluation import Evaluator, evaluate, free_motions, smallest_step, total_mass_matrix
 from ffr_dyn.equations.inertia import kept_integrals
-from ffr_dyn.equations.layout import moved, to_body_axes, to_global_axes
+from ffr_dyn.equations.layout import length_of, moved, to_body_axes, to_global_axes
 from ffr_dyn.equations.spinning import by_deflections
 from ffr_dyn.equations.statics import balance, damping
 from ffr_dyn.functions.differences import differences
@@ -148,18 +148,9 @@ def sizes(at: Evaluator) -> Array:
 
 def sizes_of(system: System) -> Array:
     """(V,) what counts as a movement of one: a radian, the size of the scene; of an elastic coordinate, that over sqrt(m)."""
-    place, length = system.layout, length_of(system)
+    place, length = system.layout, length_of(system.scene)
     sizes = np.ones(place.v_size)
     for b, body in enumerate(system.scene.bodies):
         sizes[place.R_dot(b)] = length
         sizes[place.q_dot(b)] = length * np.sqrt(body.model.mass)
     return sizes
-
-
-def length_of(system: System) -> float:
-    """[m] of a scene: to the farthest interface of a body, or the largest radius of gyration."""
-    scene = system.scene
-    points = [i.position for body in scene.bodies for i in body.model.interfaces]
-    extent = max((float(np.linalg.norm(p)) for p in points), default=0.0)
-    inertia = [np.sqrt(np.trace(body.model.rr_dm) / body.model.mass) for body in scene.bodies]
-    return max(extent, *map(float, inertia))

@@ -6,15 +6,15 @@ of all bodies where a law looks at it. The motion of their places has exact deri
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from ffr_dyn.equations.forces import At
-from ffr_dyn.equations.jets import SIZE, coordinates
-from ffr_dyn.equations.layout import moved, to_global_axes
+from ffr_dyn.equations.jets import SECOND, SIZE, Jet, coordinates
+from ffr_dyn.equations.layout import length_of, moved, to_global_axes, velocity_sizes
 from ffr_dyn.equations.placed import Sums, pair
 from ffr_dyn.equations.state_view import StateView
 from ffr_dyn.functions.differences import differences as differences_by
@@ -23,10 +23,8 @@ from ffr_dyn.scene.forces.force import Force
 from ffr_dyn.scene.forces.places import AtMarker, OnBody, OnJoint
 from ffr_prep.common.arrays import Array
 
-STEP = 1e-6  # m, rad: of differences of laws by what they are functions of, the first
-FAR = (
-    1e-3  # of a distance or coordinate, in metres or radians, from where steps grow with it: of 1e7 m rounding is 1e-9
-)
+STEP = 1e-6  # rad, or of the size of the scene: of differences of laws by what they are functions of, the first
+FAR = 1e-3  # of a distance or coordinate over the same, from where steps grow with it: of 1e7 m rounding is 1e-9
 
 
 @dataclass(frozen=True)
@@ -106,8 +104,7 @@ def _add_on_coordinates(
     watched = Watched(now.scene, now.place, now.t, now.x, now.v, [])
     still, gradients = np.zeros(c.size), np.array([jet.first for jet in jets])
     given = law_on(force, watched, c, still)
-    reach = float(np.abs(c).max())
-    slopes = differences(lambda step: law_on(force, now, c + step, still), range(c.size), c.size, reach)
+    slopes = differences(lambda step: law_on(force, now, c + step, still), steps_of(now, jets, c))
     second = gradients.T @ slopes @ gradients + sum(f * jet.second for f, jet in zip(given, jets, strict=True))
     total.add_on_pair(ends, given @ gradients, second)
     if watched.looks:
@@ -126,14 +123,29 @@ def _by_state(now: At, law: Callable[[At], Array], columns: Iterable[int]) -> Ar
     def at(step: Array) -> Array:
         return law(replace(now, x=moved(now.place, now.x, step)))
 
-    far = max((float(np.abs(now.x[now.place.R(b)]).max()) for b in range(len(now.place.n))), default=0.0)
-    return differences(at, columns, now.place.v_size, far)
+    steps = STEP * velocity_sizes(now.scene, now.place)
+    for b in range(len(now.place.n)):
+        shift = now.place.R_dot(b)
+        steps[shift] = np.maximum(steps[shift], STEP * FAR * np.abs(now.x[now.place.R(b)]).max())
+    return differences(at, steps, columns)
 
 
-def differences(function: Callable[[Array], Array], columns: Iterable[int], size: int, reach: float = 1.0) -> Array:
-    """(K, size) derivative of K numbers at zero by `size` others, of these the columns, which are added to what is as large
-    as `reach`."""
-    return differences_by(function, np.full(size, STEP * max(1.0, FAR * reach)), columns)[0]
+def steps_of(now: At, jets: Sequence[Jet], c: Array) -> Array:
+    """(K,) of differences by coordinates of the values c (K,): lengths are those that a shift changes."""
+    shifts = [bool(jet.first[..., :3].any() or jet.first[..., SECOND : SECOND + 3].any()) for jet in jets]
+    return STEP * np.maximum(np.where(shifts, length_of(now.scene), 1.0), FAR * np.abs(c))
+
+
+def differences(function: Callable[[Array], Array], steps: Array, columns: Iterable[int] | None = None) -> Array:
+    """(K, M) derivative of K numbers at zero by M others, of these the columns, by steps (M,), the first."""
+    return differences_by(function, steps, range(steps.size) if columns is None else columns)[0]
+
+
+def _steps_of_rates(now: At, of: Array) -> Array:
+    """(M,) of differences by rates, whose gradients by the velocities of bodies are (M, V): of a scene that is larger than a
+    metre they are larger. How fast it is, nothing tells."""
+    reach = np.abs(of) @ velocity_sizes(now.scene, now.place)
+    return STEP * np.maximum(1.0, np.minimum(reach, length_of(now.scene)))
 
 
 # ---- damping --------------------------------------------------------------------------------------------------------
@@ -142,7 +154,7 @@ def differences(function: Callable[[Array], Array], columns: Iterable[int], size
 def damping_of(total: Sums, now: At, force: Force) -> Array:
     """(V, V) less the derivative of a force by the velocities [A^T R_dot, omega_bar, q_dot]."""
     way, rates, law = _along(total, now, force)
-    D = way.T @ differences(lambda rate: law(now, rate), range(len(rates)), len(rates)) @ rates
+    D = way.T @ differences(lambda rate: law(now, rate), _steps_of_rates(now, rates)) @ rates
     watched, still = Watched(now.scene, now.place, now.t, now.x, now.v, []), np.zeros(len(rates))
     law(watched, still)
     if watched.looks and not isinstance(force.place, OnBody):
@@ -152,8 +164,8 @@ def damping_of(total: Sums, now: At, force: Force) -> Array:
 
 def _by_speed(now: At, law: Callable[[At], Array]) -> Array:
     """(K, V) derivative of K numbers by the velocities of bodies, by differences."""
-    size = now.place.v_size
-    return differences(lambda y: law(replace(now, v=to_global_axes(now.place, now.x, y))), range(size), size)
+    steps = _steps_of_rates(now, np.eye(now.place.v_size))
+    return differences(lambda y: law(replace(now, v=to_global_axes(now.place, now.x, y))), steps)
 
 
 def _along(total: Sums, now: At, force: Force) -> tuple[Array, Array, Callable[[At, Array], Array]]:

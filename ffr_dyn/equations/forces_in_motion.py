@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from ffr_dyn.equations.forces import At
-from ffr_dyn.equations.forces_at_rest import differences, law_on
+from ffr_dyn.equations.forces_at_rest import STEP, differences, law_on, steps_of
 from ffr_dyn.equations.jets import FIRST, SECOND, coordinates, pair_motion
 from ffr_dyn.equations.placed import Sums, pair
 from ffr_dyn.scene.forces.force import Force
@@ -43,9 +43,9 @@ def add_velocities(total: Sums, damping: Array, now: At, force: Force, screws: t
     unit = float(np.abs(rate).max()) or 1.0  # of differences of the rates, beside which the law is nearly straight
 
     def by_rate(of: Array) -> Array:
-        return differences(lambda one: law_on(force, now, c, of + unit * one), range(c.size), c.size) / unit
+        return differences(lambda rate: law_on(force, now, c, of + rate), np.full(c.size, STEP * unit))
 
-    extra, slopes = added(still), differences(added, range(c.size), c.size)
+    extra, slopes = added(still), differences(added, steps_of(now, jets, c))
     moving, resting = by_rate(rate), by_rate(still)
     second = g.T @ slopes @ g + g.T @ moving @ by_motion + np.tensordot(extra, S, 1)
     total.add_on_pair(ends, extra @ g, second)

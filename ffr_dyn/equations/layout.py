@@ -76,10 +76,18 @@ def initial_state(scene: Scene, place: Layout) -> tuple[Array, Array]:
     return x, v
 
 
+def length_of(scene: Scene) -> float:
+    """[m] of a scene: to the farthest interface of a body, or the largest radius of gyration; one of mere points."""
+    points = [i.position for body in scene.bodies for i in body.model.interfaces]
+    extent = max((float(np.linalg.norm(p)) for p in points), default=0.0)
+    inertia = [np.sqrt(np.trace(body.model.rr_dm) / body.model.mass) for body in scene.bodies]
+    return max(extent, *map(float, inertia)) or 1.0
+
+
 def velocity_sizes(scene: Scene, place: Layout) -> Array:
     """(V,) velocities that move and bend each body by about its size, and turn it by a radian, in a second; bodies without a
-    size of their own are taken as large as the largest."""
-    sizes, largest = np.ones(place.v_size), max(body.model.size for body in scene.bodies) or 1.0
+    size of their own are taken as large as the largest, or as the scene."""
+    sizes, largest = np.ones(place.v_size), max(body.model.size for body in scene.bodies) or length_of(scene)
     for b, body in enumerate(scene.bodies):
         sizes[place.R_dot(b)] = size = body.model.size or largest
         sizes[place.q_dot(b)] = size * np.sqrt(body.model.mass)
@@ -88,7 +96,9 @@ def velocity_sizes(scene: Scene, place: Layout) -> Array:
 
 def meets(scene: Scene, x: Array, Phi: Array, tolerance: float) -> bool:
     """Whether rows Phi (C,) [m, -] vanish to a tolerance, or to the rounding of positions (X,) and bodies that are large."""
-    reach = max(float(np.abs(x).max()), *(body.model.size for body in scene.bodies))
+    starts = accumulate((7 + body.model.n for body in scene.bodies), initial=0)
+    farthest = (float(np.abs(x[k : k + 3]).max()) for k, _ in zip(starts, scene.bodies, strict=False))
+    reach = max(*farthest, *(body.model.size for body in scene.bodies))
     return float(np.abs(Phi).max(initial=0.0)) <= max(tolerance, ROUNDING * reach)
 
 

@@ -25,14 +25,22 @@ import numpy as np
 
 from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.consistency.assemble import Assembled
-from ffr_dyn.consistency.evaluation import free_motions, locked, smallest_step, total_mass_matrix, unit_rows
+from ffr_dyn.consistency.evaluation import (
+    free_motions,
+    locked,
+    of_mass,
+    row_sizes,
+    smallest_step,
+    total_mass_matrix,
+    unit_rows,
+)
 from ffr_dyn.consistency.mobility import named_motion
 from ffr_dyn.consistency.tangent import sizes_of
 from ffr_dyn.equations.forces import At, applied_by
-from ffr_dyn.equations.forces_at_rest import Watched
+from ffr_dyn.equations.forces_at_rest import Watched, damping_of
 from ffr_dyn.equations.forces_in_motion import add_velocities
 from ffr_dyn.equations.inertia import kept_integrals
-from ffr_dyn.equations.layout import Layout, moved, to_body_axes, to_global_axes
+from ffr_dyn.equations.layout import Layout, moved, to_body_axes, to_global_axes, velocity_sizes
 from ffr_dyn.equations.placed import Sums, all_placed, nothing_on
 from ffr_dyn.equations.spinning import spinning
 from ffr_dyn.equations.statics import balance, damping
@@ -52,7 +60,9 @@ TOLERANCE = 1e-9  # of its last step, rad or relative to the scene: the next wou
 LARGEST = 0.5  # of a step, the same
 NEAR = 0.01  # the same, of steps that lead to no other steady motion
 LEAST_SHARE = 0.01  # of the speed, by which it is followed
-BALANCED = 1e-13  # of forces relative to all, and of rows [m, -]: what is left of a balance by rounding
+BALANCED = (
+    1e-13  # of forces relative to all, and of rows relative to their sizes: what is left of a balance by rounding
+)
 NEUTRAL = 1e-13  # of a stiffness relative to the largest: rounding
 UNBALANCED = 1e-6  # of forces along motions without stiffness, relative to all
 VARIES, OPENS = 1e-7, 1e-7  # of forces and stiffness over a turn, relative; of rows, relative to the scene
@@ -64,7 +74,7 @@ PHASES = 8  # of a turn, over which a mean is taken
 TURNS = 16  # of the fastest body, at most, over which it is taken where others have turned by whole turns as well
 SAME = 1e-6  # of a state that is in its steady motion: of velocities and forces, relative
 TURNED = 1.0  # rad: how far on the scene is looked at again
-STEP = 1e-4  # m, rad: of differences, extrapolated
+STEP = 1e-4  # rad, or relative to the bodies: of differences, extrapolated
 
 
 @dataclass(frozen=True)
@@ -260,7 +270,8 @@ def _looks(now: At, force: Force) -> bool:
 
 def _add_by_differences(total: Sums, D: Array, screws: Screws, now: At, force: Force) -> None:
     """Add the part that velocities have in a force of any kind, in its tangent and in the damping (V, V)."""
-    place, still = now.place, np.zeros(now.v.size)
+    place, still, sizes = now.place, np.zeros(now.v.size), velocity_sizes(now.scene, now.place)
+    pace = float(np.abs(now.v / sizes).max())
 
     def given(at: At) -> Array:
         return applied_by(at, force).generalised
@@ -270,22 +281,22 @@ def _add_by_differences(total: Sums, D: Array, screws: Screws, now: At, force: F
         moving = replace(now, x=there, v=velocities(place, screws, there))
         return given(moving) - given(replace(moving, v=still))
 
-    def rated(of: Array) -> Array:
-        return _derivative(lambda rate: given(replace(now, v=of + to_global_axes(place, now.x, rate))), 1.0, still.size)
+    def rated(rate: Array) -> Array:
+        return given(replace(now, v=now.v + to_global_axes(place, now.x, rate)))
 
     here = added(still)
     total.forces[:] += here
-    total.tangent[:] += _derivative(added, STEP, still.size)
+    total.tangent[:] += _derivative(added, STEP * sizes)
     for b in range(len(place.n)):  # they are in the axes of bodies that are moved, the tangent is in those at x
         shift, turn = place.R_dot(b), place.omega(b)
         total.tangent[shift, turn] -= skew(here[shift])
         total.tangent[turn, turn] -= 0.5 * skew(here[turn])
-    D += rated(still) - rated(now.v)
+    D -= damping_of(total, replace(now, v=still), force) + _derivative(rated, pace * sizes)
 
 
-def _derivative(function: Callable[[Array], Array], step: float, size: int) -> Array:
-    """(V, V) derivative of V = size numbers by as many at zero, by extrapolated central differences."""
-    return differences(function, np.full(size, step), range(size))[0]
+def _derivative(function: Callable[[Array], Array], steps: Array) -> Array:
+    """(V, V) derivative of V numbers by as many at zero, by extrapolated central differences of steps (V,)."""
+    return differences(function, steps, range(steps.size))[0]
 
 
 # ---- the balance ----------------------------------------------------------------------------------------------------
@@ -358,8 +369,9 @@ def _in_screw(found: Steady, b: int) -> Machine | None:
     count = len(machine.screws.w)
     screws = Screws(np.tile(machine.screws.u[b], (count, 1)), np.tile(machine.screws.w[b], (count, 1)))
     change = to_body_axes(place, found.x, velocities(place, screws, found.x) - found.v)
-    across = np.abs(found.about.jacobian @ change).max(initial=0.0)
-    largest = float(np.abs(change / sizes_of(machine.system)).max())
+    size, J = sizes_of(machine.system), found.about.jacobian
+    across = (np.abs(J @ change) / row_sizes(J, size)).max(initial=0.0)
+    largest = float(np.abs(change / size).max())
     return replace(machine, screws=screws) if largest and across <= OPENS * largest else None
 
 
@@ -496,7 +508,8 @@ def _leapt(lengths: Sequence[float]) -> bool:
 def _balanced(found: Steady) -> bool:
     """Whether nothing is left to do but rounding, as of what is straight at its critical speed."""
     left = np.abs(found.Z.T @ found.about.forces).max(initial=0.0)
-    open_rows = np.abs(found.about.Phi).max(initial=0.0)
+    reach = row_sizes(found.about.jacobian, sizes_of(found.machine.system))
+    open_rows = (np.abs(found.about.Phi) / reach).max(initial=0.0)
     return bool(left <= BALANCED * _size_of_forces(found) and open_rows <= BALANCED)
 
 
@@ -504,8 +517,11 @@ def _multipliers(about: Matrices, forces: Array) -> Array:
     """(C,) of the rows, that leave the least of the forces (V,) in the norm of the inverse mass matrix."""
     if not len(about.jacobian):
         return np.zeros(0)
-    yielding = np.linalg.solve(about.M, about.jacobian.T)
-    return np.linalg.lstsq(about.jacobian @ yielding, yielding.T @ forces, rcond=None)[0]
+    rows = of_mass(about.M, about.jacobian.T)
+    length = np.linalg.norm(rows, axis=0)
+    rows = rows / (unit := np.where(length > 0, length, 1.0))  # alike: those of a small machine differ by its size
+    found: Array = np.linalg.lstsq(rows.T @ rows, rows.T @ of_mass(about.M, forces), rcond=None)[0] / unit
+    return found
 
 
 def _solved(near: Steady, forces: Array) -> Array:
@@ -557,7 +573,7 @@ def _require_balance(found: Steady) -> None:
 def _size_of_forces(found: Steady) -> float:
     """Of all forces, or of those that would hold the scene's mass at its size from the axis; in the free motions' units."""
     about, machine = found.about, found.machine
-    applied = np.abs(np.linalg.solve(np.linalg.cholesky(about.M), about.forces)).max()
+    applied = np.abs(of_mass(about.M, about.forces)).max()
     held = machine.screws.fastest**2 * (sizes_of(machine.system) * np.sqrt(np.diag(about.M))).max()
     return float(max(applied, held)) or 1.0
 
@@ -577,16 +593,17 @@ def _not_lasting(found: Steady) -> InputError | None:
     machine, x = _later(found)
     about = matrices(machine, x, found.about.lam)
     size = sizes_of(machine.system)
-    opened = np.abs(about.Phi)
+    reach = row_sizes(about.jacobian, size)
+    opened = np.abs(about.Phi) / reach
     turned = np.abs(about.jacobian @ (found.Z / np.abs(found.Z / size[:, None]).max(axis=0, initial=1e-300))).max(
         axis=1, initial=0.0
     )
-    bad, limit = np.maximum(opened, turned), OPENS * max(1.0, float(size.max()))
-    if bad.max(initial=0.0) <= limit:
+    bad = np.maximum(opened, turned / reach)
+    if bad.max(initial=0.0) <= OPENS:
         return None
     names = [block.name for block in machine.system.blocks for _ in block.words]
     worst = int(np.argmax(bad[: len(names)])) if names else 0
-    if opened.max(initial=0.0) <= limit:
+    if opened.max(initial=0.0) <= OPENS:
         return InputError(
             f"about the steady motion {names[worst]!r} lets bodies that turn at different speeds move aside together, which "
             "has no constant axes: put a stiff Bushing in its place, which may turn freely, or take `periodic` with floquet"

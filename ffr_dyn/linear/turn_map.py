@@ -17,10 +17,10 @@ import numpy as np
 from ffr_dyn.compile.engine import Engine, fill_rows, new_engine
 from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.compile.workspace import new_record
-from ffr_dyn.consistency.evaluation import Evaluator, evaluate, evaluator
+from ffr_dyn.consistency.evaluation import Evaluator, evaluate, evaluator, rows_close
 from ffr_dyn.consistency.failure import failure
-from ffr_dyn.consistency.tangent import STEP, Chart, chart, length_of, sizes_of
-from ffr_dyn.equations.layout import Layout, meets, moved, to_body_axes, to_global_axes
+from ffr_dyn.consistency.tangent import STEP, Chart, chart, sizes_of
+from ffr_dyn.equations.layout import ROUNDING, Layout, length_of, moved, to_body_axes, to_global_axes
 from ffr_dyn.functions.rotation import rotation_matrix
 from ffr_dyn.functions.time_functions import evaluate as value_of
 from ffr_dyn.functions.together import together
@@ -36,7 +36,7 @@ ROWS = 100  # of a period: its steps are as many, a multiple, or fewer and the r
 CLOSED = 1e-13  # of constraints, relative to the scene: what is left open kicks stiff bodies at every return
 DIFFERENCE = 1e-5  # rad, or relative to the scene; of derivatives of a period, which are extrapolated
 LATER = 0.37  # s: when a driver is asked again whether it turns evenly
-CORRECTIONS, MET = 12, 1e-13  # of a deviation onto the constraints, and of Phi [m, -]
+CORRECTIONS, MET = 12, 1e-13  # of a deviation onto the constraints, and of rows, relative to their sizes
 AGAIN = 0.5  # rad, or the scene's size: of deviations beyond which a state does not count as come back
 
 
@@ -116,7 +116,7 @@ def after(of: Turns, x: Array, v: Array, *, rows: int = 1, later: float = 0.0) -
 
 def engine_of(of: Turns, x: Array, v: Array) -> Engine:
     """Memory for steps of the map from a state (x, v)."""
-    closed = gains(Projection(CLOSED * length_of(of.system)))
+    closed = gains(Projection(max(CLOSED * length_of(of.system.scene), ROUNDING)))
     engine = new_engine(of.system, x, v, of.method, closed, start=of.near.time, spacing=of.method.step)
     engine.work.loads.reference[:] = of.near.at.work.loads.reference
     return engine
@@ -132,7 +132,7 @@ def placed(of: Turns, s: Array) -> tuple[Array, Array]:
     for _ in range(CORRECTIONS):
         x = moved(place, near.x, y)
         now = evaluate(near.at, near.time, x, to_global_axes(place, x, V))
-        if meets(of.system.scene, x, now.Phi, MET):
+        if rows_close(near.at, x, now, MET):
             return x, to_global_axes(place, x, V + of.across @ _least(now.jacobian @ of.across, -now.nu))
         y = y + of.across @ _least(now.jacobian @ of.across, -now.Phi)
     raise ComputationError(

@@ -43,7 +43,7 @@ ROUNDING = 1e-7  # the same, below which corrections that do not shrink any more
 FOLDS = 25.0  # e-folds of the slowest internal motion in the added times
 NEUTRAL = 1e-5  # of a real part, relative to the modulus, below which a direction is neutral
 STILL = 1e-3  # e-folds over the known motion, below which it is so too
-REST = 1e-6  # of a speed or an acceleration
+REST = 1e-6  # of a motion in the time that the known one lasts, at a speed or an acceleration
 SLOW = 0.3  # contraction, beyond which the derivatives along the path are renewed
 PLACES = 17  # along the path, at which derivatives are found first
 LONGEST = 2.0  # of the added times over the known motion's, by default
@@ -122,7 +122,7 @@ def bounded_solution(
             f"the internal dynamics have {len(first.growing)} growing motions at the start and {len(last.growing)} at the "
             "end: there is no bounded solution that belongs to both"
         )
-    span = of.own.span[1] - of.own.span[0]
+    span = of.own.lasts
     before, after = (
         _whole(min(FOLDS / rate, LONGEST * span) if wanted is None else wanted, output_step)
         for wanted, rate in ((settings.before, first.growth), (settings.after, last.decay))
@@ -150,7 +150,9 @@ def _found(of: Plant, times: Array, path: Path, parts: int) -> Found:
         look(of, float(t), *w)
         for t, *w in zip(times[keep], path.y[keep], rates[keep], path.u[keep], path.near[keep], strict=True)
     ]
-    return Found(path.u[keep], [(now.x, now.v) for now in looks], [now.measured for now in looks])
+    return Found(
+        path.u[keep] * of.own.units.efforts, [(now.x, now.v) for now in looks], [now.measured for now in looks]
+    )
 
 
 def _whole(span: float, output_step: float) -> int:
@@ -167,7 +169,7 @@ def _equilibria(of: Plant, y: Array, x: Array) -> Iterator[_End]:
     for time in np.linspace(*of.own.span, PLACES):
         y, u, x = _equilibrium(of, float(time), y, u, x, at)
         at = slopes(of, float(time), y, still, u, x)
-        yield _end(at, y, u, x, STILL / (of.own.span[1] - of.own.span[0]))
+        yield _end(at, y, u, x, STILL / of.own.lasts)
 
 
 def _equilibrium(of: Plant, time: float, y: Array, u: Array, x: Array, at: Slopes) -> tuple[Array, Array, Array]:
@@ -176,12 +178,15 @@ def _equilibrium(of: Plant, time: float, y: Array, u: Array, x: Array, at: Slope
     for _ in range(ITERATIONS):
         now = look(of, time, y, still, u, x)
         x, scale = now.x, time_unit(at) ** 2
-        matrix = np.block([[scale * at.by_y, scale * at.by_u], [at.outputs, np.zeros((len(u), len(u)))]])
+        effect = np.linalg.norm(at.by_u, axis=0)  # of efforts on all that they move: what is stiff hardly follows them
+        efforts = 1 / np.where(effect > 0, effect, 1.0)
+        matrix = np.block([[scale * at.by_y, at.by_u * efforts], [at.outputs, np.zeros((len(u), len(u)))]])
         step = np.linalg.lstsq(matrix, -np.concatenate([scale * now.y_ddot, now.s]), rcond=1e-12)[0]
-        y, u, size = y + step[: y.size], u + step[y.size :], float(np.abs(step[: y.size]).max())
+        y, u = y + step[: y.size], u + step[y.size :] * efforts / scale
+        size = float(np.abs(step[: y.size]).max())
         if size < 1e-11 * max(1.0, float(np.abs(y).max())):
             left = np.abs(now.y_ddot).max(), np.abs(now.s).max(initial=0.0)
-            if left[0] <= REST * max(1.0, float(np.abs(at.by_y).max())) and left[1] < REST:
+            if left[0] <= REST * max(of.own.lasts**-2, float(np.abs(at.by_y).max())) and left[1] < REST:
                 return y, u, x
             break  # forces along a motion without stiffness
         if size > SLOW * before:
@@ -224,11 +229,12 @@ def _require_rest(of: Plant, *ends: _End) -> None:
     for time, end in zip(own.span, ends, strict=True):
         still = np.zeros(own.at.system.layout.v_size)
         rows = evaluate(own.at, time, end.x, still)
-        speed, change = (float(np.abs(row[own.known]).max(initial=0.0)) for row in (rows.nu, rows.gamma))
-        if max(speed, change) > REST:
+        speed, change = (np.abs(row[own.known]) for row in (rows.nu, rows.gamma))
+        if np.max(np.maximum(speed, change * own.lasts) * own.lasts / own.units.known, initial=0.0) > REST:
             raise InputError(
-                f"at t = {time:.6g} s a known motion is not at rest (speed {speed:.3g}, acceleration {change:.3g}): the "
-                "bounded solution needs one that starts and ends at rest; give it ends where both are zero"
+                f"at t = {time:.6g} s a known motion is not at rest (speed {speed.max():.3g}, acceleration "
+                f"{change.max():.3g}): the bounded solution needs one that starts and ends at rest; give it ends where both "
+                "are zero"
             )
 
 

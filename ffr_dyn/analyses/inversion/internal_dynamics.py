@@ -120,7 +120,8 @@ def fitting(of: Plant, at: Slopes, x: Array, labels: list[str]) -> tuple[Effort,
 def _unfit(of: Plant, at: Slopes, found: Internal, x: Array, labels: list[str]) -> str:
     """The motions that no effort reaches, the efforts that reach none, and what those move instead."""
     names = [effort.name for effort in of.own.unknown]
-    motions = combination(found.unreached[0], labels)
+    lost = found.unreached[0] / of.own.units.known
+    motions = combination(lost / np.linalg.norm(lost), labels)
     idle = null_space(found.gain)[:, 0] if len(found.gain) else np.eye(len(names))[0]
     forces = combination(idle, names)
     size = np.maximum(np.linalg.norm(at.by_u, axis=0), 1e-300)
@@ -135,7 +136,9 @@ def _moved(of: Plant, y_ddot: Array, x: Array) -> str:
     """The effect of accelerations y_ddot (D,) at rest on joint coordinates, the largest first, and on the coordinates y."""
     own, place = of.own, of.own.at.system.layout
     names, gradients = coordinate_gradients(own.at.system.scene, place, x, np.zeros(place.v_size))
-    moved = np.concatenate([gradients @ (motions(of, own.span[0], x) @ y_ddot), y_ddot[own.inner.size :]])
+    moved = np.concatenate(
+        [gradients @ (motions(of, own.span[0], x) @ y_ddot), (y_ddot * own.units.y)[own.inner.size :]]
+    )
     said = [*names, *own.names[own.inner.size :]]
     largest = np.argsort(-np.abs(moved))[:4]
     if not np.abs(moved).max(initial=0.0) > 0:

@@ -3,7 +3,7 @@
     y_ddot = a(t, y, y_dot) + A(t, y) u,    s(t, y) = 0
 
 The known motions are outputs here and hold nothing, so that u may act on them over any number of derivatives: at once
-(relative degree two), or by way of springs and bodies between (four and more).
+(relative degree two), or by way of springs and bodies between (four and more). Here y, u and s are in units of the machine.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ffr_dyn.analyses.efforts import Effort, effort_slots
-from ffr_dyn.analyses.inversion.servo import ServoMotion, guided, left_free, placed, square, unguided
+from ffr_dyn.analyses.inversion.servo import ServoMotion, guided, left_free, placed, rates_of, square, unguided
 from ffr_dyn.analyses.inversion.turns import count_turns
 from ffr_dyn.compile.engine import with_model
 from ffr_dyn.compile.scene_tables import compile_scene
@@ -23,8 +23,6 @@ from ffr_dyn.consistency.evaluation import Evaluator, evaluate, evaluator
 from ffr_dyn.equations.constraint_rows import blocks_of
 from ffr_dyn.equations.layout import to_global_axes
 from ffr_prep.common.arrays import Array
-
-DIFFERENCE = 1e-6
 
 
 @dataclass(frozen=True)
@@ -86,7 +84,8 @@ def with_efforts(of: Plant, efforts: tuple[Effort, ...]) -> Plant:
     """The plant with some of its efforts; the others are zero."""
     of.free.system.model.loads.data[of.slots] = 0.0
     slots, shares = effort_slots(of.free, efforts)
-    return Plant(replace(of.own, unknown=efforts), of.free, slots, shares, of.left_free)
+    units = replace(of.own.units, efforts=of.own.units.efforts[[of.own.unknown.index(effort) for effort in efforts]])
+    return replace(of, own=replace(of.own, unknown=efforts, units=units), slots=slots, shares=shares)
 
 
 def freed(own: ServoMotion, names: tuple[str, ...]) -> Evaluator:
@@ -106,26 +105,25 @@ def look(of: Plant, time: float, y: Array, rate: Array, u: Array, near: Array) -
     clock, w = float(np.clip(time, *own.span)), np.concatenate([y, rate])
     at = guided(own, clock, w)
     x, now = placed(own, at, clock, w, near)
-    V = np.linalg.solve(square(own, now), np.concatenate([-now.nu[own.held], rate[own.inner.size :]]))
-    v = to_global_axes(at.system.layout, x, V)
+    v = to_global_axes(at.system.layout, x, rates_of(own, now, rate))
     now = evaluate(at, clock, x, v)
-    of.free.system.model.loads.data[of.slots] = of.shares @ u
+    of.free.system.model.loads.data[of.slots] = of.shares @ (u * own.units.efforts)
     count_turns(own.angles, of.free, clock, y)
     acceleration = evaluate(of.free, clock, x, v).acceleration
     joints = now.jacobian[own.inner] @ acceleration - now.gamma[own.inner]
-    y_ddot, measured = np.concatenate([joints, acceleration[own.elastic]]), of.free.work.loads.measured.copy()
-    return Look(x, v, y_ddot, now.Phi[own.known], measured)
+    y_ddot = np.concatenate([joints, acceleration[own.elastic]]) / own.units.y
+    return Look(x, v, y_ddot, now.Phi[own.known] / own.units.known, of.free.work.loads.measured.copy())
 
 
 def slopes(of: Plant, time: float, y: Array, rate: Array, u: Array, near: Array) -> Slopes:
     """Central differences around a state; exact by u."""
     D, U = of.size, u.size
     now = look(of, time, y, rate, u, near)
-    one, by_y, outputs = np.eye(D), np.zeros((D, D)), np.zeros((U, D))
-    for k, h in enumerate(DIFFERENCE * np.maximum(1.0, np.abs(y))):
+    one, by_y, outputs = np.eye(D), np.zeros((D, D)), np.zeros((len(now.s), D))
+    steps_of_y, steps = of.own.steps(y, rate)
+    for k, h in enumerate(steps_of_y):
         ahead, behind = (look(of, time, y + sign * h * one[k], rate, u, now.x) for sign in (1, -1))
         by_y[:, k], outputs[:, k] = (ahead.y_ddot - behind.y_ddot) / (2 * h), (ahead.s - behind.s) / (2 * h)
-    steps = DIFFERENCE * np.maximum(1.0, np.abs(rate))
     by_rate = _difference(lambda z: look(of, time, y, z, u, now.x).y_ddot, rate, steps)
     by_u = _difference(lambda z: look(of, time, y, rate, z, now.x).y_ddot, u, np.ones(U))
     return Slopes(by_y, by_rate, by_u, outputs)
@@ -138,7 +136,7 @@ def motions(of: Plant, time: float, x: Array) -> Array:
     rates = np.zeros((own.held.size + own.elastic.size, own.size))
     rates[np.searchsorted(own.held, own.inner), np.arange(own.inner.size)] = 1.0
     rates[own.held.size :, own.inner.size :] = np.eye(own.elastic.size)
-    return np.linalg.solve(square(own, now), rates)
+    return np.linalg.solve(square(own, now), rates * own.units.y)
 
 
 def _difference(function: Callable[[Array], Array], at: Array, steps: Array) -> Array:

@@ -4,7 +4,8 @@
 
 No constraint force acts along S; the efforts u do. With P = S M_Phi^-1 B regular (M_Phi^-1: the inverse mass projected on the
 joints) the known motions have relative degree two and u follows at every state. What they leave free are the internal
-coordinates y: joint and elastic coordinates that, with the joints and the known motions, fix every position.
+coordinates y: joint and elastic coordinates that, with the joints and the known motions, fix every position. Values of y are
+in units of the machine, so that steps and tolerances are the same for a small and a large one.
 (Blajer & Kolodziejczyk, Multibody System Dynamics 11 (2004) 343-364; Seifried, Dynamics of Underactuated Multibody Systems,
 Springer 2014, ch. 3.)
 """
@@ -16,7 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg import qr
 
-from ffr_dyn.analyses.efforts import Effort, sized
+from ffr_dyn.analyses.efforts import Effort, sized, with_work, without, work_of
 from ffr_dyn.analyses.inversion.turns import Angle, angles_of, count_turns
 from ffr_dyn.compile.engine import with_model
 from ffr_dyn.compile.scene_tables import compile_scene
@@ -29,24 +30,51 @@ from ffr_dyn.consistency.evaluation import (
     evaluator,
     free_motions,
     locked,
+    of_mass,
+    row_sizes,
     total_mass_matrix,
     unit_rows,
 )
 from ffr_dyn.consistency.mobility import coordinate_gradients, coordinate_word
 from ffr_dyn.equations.constraint_rows import Block
 from ffr_dyn.equations.constraints import evaluate_word
-from ffr_dyn.equations.layout import moved, to_body_axes, to_global_axes
+from ffr_dyn.equations.forces import At
+from ffr_dyn.equations.layout import (
+    Layout,
+    length_of,
+    meets,
+    moved,
+    to_body_axes,
+    to_global_axes,
+    velocity_sizes,
+)
 from ffr_dyn.functions.time_functions import polynomial
 from ffr_dyn.scene.drivers import Driver, driver_word
-from ffr_dyn.scene.joints import COORDINATES, Word
+from ffr_dyn.scene.joints import COORDINATES, DRIVEN_ANGLE, Word
 from ffr_dyn.scene.scene import Scene, marker_number
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError, InputError
 
 ITERATIONS = 20
-TOLERANCE = 1e-12  # of a step of the positions
+TOLERANCE = 1e-12  # of a step of the positions, relative to sizes, and of open rows
 SINGULAR = 1e13  # condition of the equations for accelerations, reactions and efforts
-UNDETERMINED = 1e-8  # of the smallest singular value of P with rows and columns of length one
+DIFFERENCE = 1e-6
+
+
+@dataclass(frozen=True)
+class Units:
+    """What counts as one in a machine.
+
+    length  : [m];  sizes, light : (V,) velocities of bodies, as in `velocity_sizes`, and those of about one energy
+    y, known, efforts : of coordinates y (D,), known motions (K,) [m, rad] and efforts (U,) [N, N m]
+    """
+
+    length: float
+    sizes: Array
+    light: Array
+    y: Array
+    known: Array
+    efforts: Array
 
 
 @dataclass(frozen=True)
@@ -60,6 +88,7 @@ class ServoMotion:
     data     : where the functions of the joint coordinates keep their two numbers
     span     : known motions are held at their values outside of it [s]
     angles   : on which forces act
+    units    : of y, known motions and efforts
     """
 
     at: Evaluator
@@ -72,12 +101,22 @@ class ServoMotion:
     data: Array
     span: tuple[float, float]
     names: tuple[str, ...]
+    units: Units
     angles: tuple[Angle, ...] = ()
 
     @property
     def size(self) -> int:
         """Number of coordinates y."""
         return self.inner.size + self.elastic.size
+
+    @property
+    def lasts(self) -> float:
+        """[s] of the known motions."""
+        return self.span[1] - self.span[0]
+
+    def steps(self, y: Array, rate: Array) -> tuple[Array, Array]:
+        """(D,) of differences by y and by y_dot."""
+        return DIFFERENCE * np.maximum(1.0, np.abs(y)), DIFFERENCE * np.maximum(1.0 / self.lasts, np.abs(rate))
 
 
 @dataclass(frozen=True)
@@ -135,7 +174,12 @@ def _in_coordinates(
     plant_rows = np.setdiff1d(every, np.concatenate([inner_rows, known_rows]))
     data = system.model.functions.start[rows.function[inner_rows]]
     at = _owning(sized(evaluator(system), unknown, np.zeros(len(unknown))))
-    own = ServoMotion(at, unknown, plant_rows, known_rows, inner_rows, held, np.array(elastic, int), data, span, names)
+    guides = [word for name in known for block in ordered if block.name == name for word in block.words]
+    start = At(without(scene, unknown), assembled.system.layout, span[0], assembled.x, assembled.v)
+    units = _units(start, unknown, guides, names, np.array(elastic, int), span[1] - span[0])
+    own = ServoMotion(
+        at, unknown, plant_rows, known_rows, inner_rows, held, np.array(elastic, int), data, span, names, units
+    )
     y = internal_values(own, assembled.x, assembled.v)
     evaluate(at, span[0], assembled.x, assembled.v)
     return replace(own, angles=angles_of(at, names[: own.inner.size], span[0], y))
@@ -155,13 +199,43 @@ def rows_of(blocks: list[Block], names: tuple[str, ...]) -> Array:
     return np.concatenate([at[name] for name in names] or [np.zeros(0)]).astype(int)
 
 
-def effort_columns(
-    at: Evaluator, unknown: tuple[Effort, ...], state: tuple[float, Array, Array], without: Array
-) -> Array:
-    """(V, U) generalised forces of unit efforts at a state (time, x, v), by the forces (V,) without them: exact, since
-    efforts enter linearly."""
-    forces = [evaluate(sized(at, unknown, one), *state).force - without for one in np.eye(len(unknown))]
-    return np.array(forces).reshape(len(unknown), without.size).T
+def effort_columns(own: ServoMotion, at: Evaluator, state: tuple[float, Array, Array], alone: Array) -> Array:
+    """(V, U) generalised forces of efforts of one of their units at a state (time, x, v), by the forces (V,) alone:
+    exact, since efforts enter linearly."""
+    forces = [evaluate(sized(at, own.unknown, one), *state).force - alone for one in np.diag(own.units.efforts)]
+    return np.array(forces).reshape(len(own.unknown), alone.size).T
+
+
+def _units(
+    start: At,
+    unknown: tuple[Effort, ...],
+    known: list[Word],
+    names: tuple[str, ...],
+    elastic: Array,
+    lasts: float,
+) -> Units:
+    """Of joint coordinates by their names, and elastic ones by their numbers in v. An effort of one does the work of the
+    forces at the start, or moves the machine by its size in the time that the known motions last [s]."""
+    scene, place, length = start.scene, start.place, length_of(start.scene)
+    sizes = velocity_sizes(scene, place)
+    work = (length / lasts) ** 2 * sum(body.model.mass for body in scene.bodies) + work_of(start, 0 * start.v)
+    joints = [1.0 if name.endswith(".angle") else length for name in names[: len(names) - elastic.size]]
+    return Units(
+        length,
+        sizes,
+        _of_one_energy(scene, place, sizes),
+        np.concatenate([joints, sizes[elastic]]),
+        np.array([1.0 if row.kind == DRIVEN_ANGLE else length for row in known]),
+        with_work(scene, unknown, work),
+    )
+
+
+def _of_one_energy(scene: Scene, place: Layout, sizes: Array) -> Array:
+    """(V,) velocities at which coordinates of bodies carry about one energy, whatever the size and the mass of a body."""
+    found = sizes.copy()
+    for b, body in enumerate(scene.bodies):
+        found[place.iv[b] : place.iv[b] + 6 + place.n[b]] /= np.sqrt(body.model.mass) * sizes[place.iv[b]]
+    return found
 
 
 # ---- internal coordinates --------------------------------------------------------------------------------------------
@@ -179,7 +253,7 @@ def _internal(
     elastic = [int(k) for b in range(len(place.n)) for k in np.arange(place.v_size)[place.q_dot(b)]]
     labels = [f"{scene.bodies[b].name}.q.{k + 1}" for b in range(len(place.n)) for k in range(place.n[b])]
     candidates = np.concatenate([gradients, unit_rows(np.array(elastic, int), place.v_size)])
-    length = np.linalg.norm(np.linalg.solve(np.linalg.cholesky(M), candidates.T), axis=0)
+    length = np.linalg.norm(of_mass(M, candidates.T), axis=0)
     _, R, order = qr((candidates @ Z / length[:, None]).T, pivoting=True, mode="economic")
     d = Z.shape[1]
     if d and (R.shape[1] < d or np.abs(np.diag(R)).min() < 1e-6):
@@ -208,7 +282,7 @@ def internal_values(own: ServoMotion, x: Array, v: Array) -> Array:
     values = _joint_values(scene, own, x, v)
     numbers = [names.index(name) for name in own.names[: own.inner.size]]
     position = np.concatenate([[values[k] for k in numbers], x[_positions(own)]])
-    return np.concatenate([position, gradients[numbers] @ V, V[own.elastic]])
+    return np.concatenate([position / own.units.y, np.append(gradients[numbers] @ V, V[own.elastic]) / own.units.y])
 
 
 def _joint_values(scene: Scene, own: ServoMotion, x: Array, v: Array) -> list[float]:
@@ -233,7 +307,7 @@ def _positions(own: ServoMotion) -> Array:
 def guided(own: ServoMotion, time: float, w: Array) -> Evaluator:
     """The evaluator whose joint coordinates go through y with the rate y_dot."""
     d, data = own.size, own.at.system.model.functions.data
-    y, rate = w[: own.inner.size], w[d : d + own.inner.size]
+    y, rate = (w[k : k + own.inner.size] * own.units.y[: own.inner.size] for k in (0, d))
     data[own.data], data[own.data + 1] = y - rate * time, rate
     return own.at
 
@@ -246,8 +320,7 @@ def at_moment(own: ServoMotion, time: float, w: Array, near: Array) -> Moment:
     clock = float(np.clip(time, *own.span))
     at = guided(own, clock, w)
     x, now = placed(own, at, clock, w, near)
-    V = np.linalg.solve(square(own, now), np.concatenate([-now.nu[own.held], w[own.size + own.inner.size :]]))
-    v = to_global_axes(own.at.system.layout, x, V)
+    v = to_global_axes(own.at.system.layout, x, rates_of(own, now, w[own.size :]))
     count_turns(own.angles, at, clock, w)
     now = evaluate(at, clock, x, v)
     return _accelerated(own, at, now, (clock, x, v), now.gamma)
@@ -255,18 +328,21 @@ def at_moment(own: ServoMotion, time: float, w: Array, near: Array) -> Moment:
 
 def placed(own: ServoMotion, at: Evaluator, time: float, w: Array, x: Array) -> tuple[Array, Evaluation]:
     """The position by Newton's method from x, and the equations there at rest."""
-    place, slots = own.at.system.layout, _positions(own)
-    still, d = np.zeros(place.v_size), own.size
+    place, slots, bending = own.at.system.layout, _positions(own), own.units.y[own.inner.size :]
+    still, wanted = np.zeros(place.v_size), w[own.inner.size : own.size] * bending
     for _ in range(ITERATIONS):
         now = evaluate(at, time, x, still)
-        left = np.concatenate([-now.Phi[own.held], w[own.inner.size : d] - x[slots]])
-        if np.abs(left).max() < TOLERANCE:
+        Phi, off = now.Phi[own.held], wanted - x[slots]
+        allowed = TOLERANCE * row_sizes(now.jacobian[own.held], own.units.sizes)
+        held = bool(np.abs(off / bending).max(initial=0.0) < TOLERANCE)
+        if held and (np.abs(Phi) <= allowed).all():
             return x, now
-        if not np.isfinite(left).all():
+        if not (np.isfinite(Phi).all() and np.isfinite(off).all()):
             break
-        step = np.linalg.solve(square(own, now), left)
+        step = np.linalg.solve(square(own, now), np.concatenate([-Phi, off]))
+        rounded = held and meets(own.at.system.scene, x, Phi, 0.0)
         x = moved(place, x, step)
-        if np.abs(step).max() < TOLERANCE:
+        if rounded or np.abs(step / own.units.sizes).max() < TOLERANCE:
             return x, evaluate(at, time, x, still)
     raise ComputationError(
         f"at t = {time:.6g} s no position belongs to the known motions: they are out of reach, or "
@@ -278,29 +354,44 @@ def square(own: ServoMotion, now: Evaluation) -> Array:
     return np.concatenate([now.jacobian[own.held], unit_rows(own.elastic, now.jacobian.shape[1])])
 
 
+def rates_of(own: ServoMotion, now: Evaluation, rate: Array) -> Array:
+    """(V,) velocities in body axes of y_dot (D,), at the equations of a position at rest."""
+    bending = (rate * own.units.y)[own.inner.size :]
+    found: Array = np.linalg.solve(square(own, now), np.concatenate([-now.nu[own.held], bending]))
+    return found
+
+
 def _accelerated(
     own: ServoMotion, at: Evaluator, now: Evaluation, state: tuple[float, Array, Array], gamma: Array
 ) -> Moment:
-    """Accelerations and efforts at an evaluated state."""
-    V, C = now.jacobian.shape[1], own.plant.size
-    mass = evaluated_mass_matrix(at)
-    B, J, S = effort_columns(at, own.unknown, state, now.force), now.jacobian[own.plant], now.jacobian[own.known]
-    matrix = np.zeros((V + C + B.shape[1], V + C + B.shape[1]))
-    matrix[:V, :V] = mass
+    """Accelerations and efforts at an evaluated state, of equations whose rows and columns are brought to one size, as they
+    have different units."""
+    V, C, U = now.jacobian.shape[1], own.plant.size, own.known.size
+    B, J, S = effort_columns(own, at, state, now.force), now.jacobian[own.plant], now.jacobian[own.known]
+    matrix = np.zeros((V + C + U, V + C + U))
+    matrix[:V, :V] = evaluated_mass_matrix(at)
     matrix[:V, V : V + C], matrix[V : V + C, :V] = J.T, J
     matrix[:V, V + C :], matrix[V + C :, :V] = -B, S
+    light = own.units.light
+    across = np.concatenate([light, 1 / _lengths(J * light), 1 / _lengths(B.T * light)])
+    along = np.concatenate([light, 1 / _lengths(J * light), 1 / _lengths(S * light)])
+    matrix = matrix * np.outer(along, across)
     _check_determined(matrix, state[0])
-    found = np.linalg.solve(matrix, np.concatenate([now.force, gamma[own.plant], gamma[own.known]]))
+    found = across * np.linalg.solve(matrix, along * np.concatenate([now.force, gamma[own.plant], gamma[own.known]]))
     acceleration = found[:V]
     joints = now.jacobian[own.inner] @ acceleration - gamma[own.inner]
-    y_ddot = np.concatenate([joints, acceleration[own.elastic]])
-    return Moment(state[1], state[2], found[V + C :], y_ddot, at.work.loads.measured.copy())
+    y_ddot = np.concatenate([joints, acceleration[own.elastic]]) / own.units.y
+    efforts = found[V + C :] * own.units.efforts
+    return Moment(state[1], state[2], efforts, y_ddot, at.work.loads.measured.copy())
 
 
-def _check_determined(matrix: Array, time: float) -> None:
-    """Rows and columns are brought to one size first, as they have different units."""
-    size = np.sqrt(np.abs(matrix).max(axis=0) * np.abs(matrix).max(axis=1))
-    scaled = matrix / np.sqrt(np.outer(size, size)) if (size > 0).all() else matrix
+def _lengths(rows: Array) -> Array:
+    """(K,) of rows, one of those that vanish."""
+    length = np.linalg.norm(rows, axis=1)
+    return np.where(length > 0, length, 1.0)
+
+
+def _check_determined(scaled: Array, time: float) -> None:
     if not np.linalg.cond(scaled) < SINGULAR:
         raise ComputationError(
             f"at t = {time:.6g} s the unknown forces no longer determine the known motions: the mechanism passes a position "
@@ -316,7 +407,7 @@ def slope(own: ServoMotion, time: float, w: Array, near: Array) -> tuple[Array, 
 
 def slope_matrix(own: ServoMotion, time: float, w: Array, near: Array) -> Array:
     """(2 d, 2 d) central differences of the slope."""
-    scale = 1e-6 * np.maximum(1.0, np.abs(w))
+    scale = np.concatenate(own.steps(w[: own.size], w[own.size :]))
     sides = [
         [slope(own, time, w + sign * h * one, near)[0] for sign in (1, -1)]
         for h, one in zip(scale, np.eye(w.size), strict=True)
