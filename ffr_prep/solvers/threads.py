@@ -32,6 +32,7 @@ Given1 = TypeVar("Given1")
 _BLAS = ThreadpoolController()
 _PIECES = 16
 _AHEAD = 2  # items for each thread
+_FEW = 8  # columns of a sparse product; of more the rows of X are longer than what the cache takes at a time
 
 
 @contextmanager
@@ -111,7 +112,16 @@ def product_of_sizes(A: sp.sparray, X: Array) -> Array:
 
 @numba.njit(cache=True, nogil=True)
 def _multiply(indptr, indices, data, X, out, first, last):  # type: ignore[no-untyped-def]
-    """Rows first...last of a product, four columns at a time, the sums of which stay in registers."""
+    """Rows first...last of a product; of a few columns four at a time, the sums of which stay in registers."""
+    if X.shape[1] > _FEW:
+        for i in range(first, last):
+            row = out[i]
+            row[:] = 0.0
+            for k in range(indptr[i], indptr[i + 1]):
+                value, other = data[k], X[indices[k]]
+                for j in range(row.size):
+                    row[j] += value * other[j]
+        return
     whole = X.shape[1] - X.shape[1] % 4
     for i in range(first, last):
         row = out[i]
