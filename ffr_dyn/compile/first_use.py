@@ -106,5 +106,5 @@ def compile_functions(names: Sequence[str]) -> None:
 
 
 if __name__ == "__main__":
-    gc.disable()  # this process ends soon; to look for what it no longer needs takes a sixth of its time
+    gc.disable()  # this process ends soon; looking for what it no longer needs takes time alone
     compile_functions(sys.argv[1:])
