@@ -50,7 +50,7 @@ class MeshedBody:
 
 def meshed_body(
     mesh_name: str, name: str, material: Material, ends: tuple[str, str], kind: str, modes: int,
-    reference: ReferenceConditions | None = None,
+    reference: ReferenceConditions | None = None, drawn_modes: int | None = None,
 ) -> MeshedBody:  # fmt: skip
     """Reduce a mesh with two interfaces of one kind by `modes` fixed-interface modes; by default simply supported."""
     mesh = read_mesh(MESHES / mesh_name)
@@ -58,7 +58,8 @@ def meshed_body(
     conditions = SimplySupported(*ends) if reference is None else reference
     method = CraigBampton(modes)
     body = fp.reduce(
-        fp.from_mesh(mesh, material, regions), fp.Request(name=name, reference=conditions, reduction=method)
+        fp.from_mesh(mesh, material, regions),
+        fp.Request(name=name, reference=conditions, reduction=method, drawn_modes=drawn_modes),
     )
     with threadpool_limits(1):  # as fp.reduce: bit for bit the same modes, also where frequencies are double
         matrices = assemble(mesh, material)
@@ -68,10 +69,12 @@ def meshed_body(
 
 
 @cache
-def pendulum_rod(kind: str, modes: int, reference: ReferenceConditions | None = None) -> MeshedBody:
+def pendulum_rod(
+    kind: str, modes: int, reference: ReferenceConditions | None = None, drawn_modes: int | None = None
+) -> MeshedBody:
     """Plate strip of 1.2 m, E = 7e10 Pa, interfaces "hinge" and "tip"."""
     metal = Material("metal", 7e10, 0.3, 5540.0)
-    return meshed_body("pendulum.geo", "rod", metal, ("hinge", "tip"), kind, modes, reference)
+    return meshed_body("pendulum.geo", "rod", metal, ("hinge", "tip"), kind, modes, reference, drawn_modes)
 
 
 @cache

@@ -45,6 +45,7 @@ from ffr_dyn.results.quantities import catalogue
 from ffr_dyn.results.result import Axis, Quantity, Result
 from ffr_dyn.scene.checks import several
 from ffr_dyn.scene.described import described
+from ffr_dyn.scene.forces.load import Load
 from ffr_dyn.scene.scene import Scene
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.brief import Brief
@@ -358,8 +359,11 @@ def inputs_and_outputs(
 def _amounts(near: Chart, scene: Scene, inputs: tuple[Effort | str, ...], inertia: Array) -> Array:
     """(U,) of inputs that are not lost beside the forces of the scene and its inertia (V,)."""
     here, place = without(near.at.system.scene, _efforts(inputs)), near.at.system.layout
-    work = work_of(At(here, place, near.time, near.x, to_global_axes(place, near.x, near.V)), inertia) or 1.0
+    now = At(here, place, near.time, near.x, to_global_axes(place, near.x, near.V))
+    work = work_of(now, inertia) or 1.0
     weight = length_of(here) * sum(body.model.mass for body in here.bodies)
+    for load in _loads(scene, inputs):
+        _check_there(load, now)
     found = np.array([work / weight if isinstance(item, str) and _is_base(scene, item) else 1.0 for item in inputs])
     efforts = np.array([not isinstance(item, str) for item in inputs], bool)
     found[efforts] = with_work(here, _efforts(inputs), work)
@@ -395,6 +399,25 @@ def _with_inputs(at: Evaluator, scene: Scene, inputs: tuple[Effort | str, ...], 
     )
     sizes = [amount for item, amount in zip(inputs, u, strict=True) if not isinstance(item, str)]
     return sized(fed, _efforts(inputs), np.array(sizes))
+
+
+def _loads(scene: Scene, inputs: tuple[Effort | str, ...]) -> list[Load]:
+    """Those that are inputs, by a share of themselves."""
+    return [
+        scene.loads[_load_number(scene, item)] for item in inputs if isinstance(item, str) and not _is_base(scene, item)
+    ]
+
+
+def _check_there(load: Load, now: At) -> None:
+    """InputError for a load that is zero now, but for the rounding of the time: every share of it is zero as well."""
+    for component in (*load.force, *load.moment):
+        value, rate, _ = now.value(component)
+        if abs(value) > 4.0 * np.finfo(float).eps * abs(now.t * rate):
+            return
+    raise InputError(
+        f"input {load.name!r}: the load is zero at {now.t:g} s, and so is every share of it; take a force as input, such as "
+        f"{load.marker}:1,0,0, or a time at which the load is there"
+    )
 
 
 def _is_base(scene: Scene, item: str) -> bool:
