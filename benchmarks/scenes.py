@@ -50,7 +50,7 @@ class MeshedBody:
 
 def meshed_body(
     mesh_name: str, name: str, material: Material, ends: tuple[str, str], kind: str, modes: int,
-    reference: ReferenceConditions | None = None, drawn_modes: int | None = None,
+    reference: ReferenceConditions | None = None, linear: bool = False,
 ) -> MeshedBody:  # fmt: skip
     """Reduce a mesh with two interfaces of one kind by `modes` fixed-interface modes; by default simply supported."""
     mesh = read_mesh(MESHES / mesh_name)
@@ -59,7 +59,7 @@ def meshed_body(
     method = CraigBampton(modes)
     body = fp.reduce(
         fp.from_mesh(mesh, material, regions),
-        fp.Request(name=name, reference=conditions, reduction=method, drawn_modes=drawn_modes),
+        fp.Request(name=name, reference=conditions, reduction=method, linear=linear),
     )
     with threadpool_limits(1):  # as fp.reduce: bit for bit the same modes, also where frequencies are double
         matrices = assemble(mesh, material)
@@ -70,11 +70,11 @@ def meshed_body(
 
 @cache
 def pendulum_rod(
-    kind: str, modes: int, reference: ReferenceConditions | None = None, drawn_modes: int | None = None
+    kind: str, modes: int, reference: ReferenceConditions | None = None, linear: bool = False
 ) -> MeshedBody:
     """Plate strip of 1.2 m, E = 7e10 Pa, interfaces "hinge" and "tip"."""
     metal = Material("metal", 7e10, 0.3, 5540.0)
-    return meshed_body("pendulum.geo", "rod", metal, ("hinge", "tip"), kind, modes, reference, drawn_modes)
+    return meshed_body("pendulum.geo", "rod", metal, ("hinge", "tip"), kind, modes, reference, linear)
 
 
 @cache
