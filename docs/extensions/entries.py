@@ -28,7 +28,8 @@ parameters; units are those that a plain number has. Keys without a default must
 STRUCTURE = """# Entries of a structure file
 
 Made from the declarations in the code. [Beams, plates and bodies of several kinds](../structural.md) tells how its parts work
-together. Numbers are plain, in the unit that stands beside their meaning. Keys without a default must be given.
+together. Numbers are in the unit that stands beside their meaning, or a text has its own: `d = "50 mm"`. Keys without a
+default must be given.
 
 """
 MATERIAL = """# Entries of a material file
@@ -79,12 +80,13 @@ def kinds() -> list[FileKind]:
 
 
 def _material(needed: set[str], allowed: set[str]) -> dict[str, Any]:
+    number = {"anyOf": [{"type": "number"}, {"type": "string"}]}
     words = {"name": {"type": "string"}, "elasticity": _rows(6), "axes": _rows(3)}
     order = [key for key in KEYS if key in needed | allowed]
     return {
         "description": "The whole file.",
         "required": sorted(needed),
-        "properties": {key: {**words.get(key, {"type": "number"}), "description": KEYS[key]} for key in order},
+        "properties": {key: {**words.get(key, number), "description": KEYS[key]} for key in order},
     }
 
 

@@ -376,9 +376,9 @@ def names_of_scene(made: Study) -> frozenset[str]:
 
 
 def recipe(made: Study, body: str, point: Mapping[str, Value]) -> str:
-    """The line that makes a body of a point."""
-    found = substituted(made.recipes[body], point, f"bodies.{body}.make")
-    return str(found)
+    """The line that makes a body of a point; a value of several words, such as 10 mm, stays in the word that it is put in."""
+    words = substituted(shlex.split(made.recipes[body]), point, f"bodies.{body}.make")
+    return shlex.join(str(word) for word in words)
 
 
 def mark(made: Study) -> str:

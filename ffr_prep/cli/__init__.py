@@ -74,8 +74,8 @@ strain. With eigenmodes the choice matters: take the one that looks like the joi
 
 """
 MATERIAL_NOTES = """\b
-Materials: a name (steel, aluminium, titanium, ...), or E=7e10,nu=0.3,rho=5540 in SI units; for several volumes
-  --material web=steel --material rim=E=7e10,nu=0.3,rho=2700, each with the name of a volume of the mesh.
+Materials: a name (steel, aluminium, titanium, ...), or E=70GPa,nu=0.3,rho=2700, SI units where none is written; for several
+  volumes --material web=steel --material rim=E=7e10,nu=0.3,rho=2700, each with the name of a volume of the mesh.
 Orthotropic ones by E1,E2,E3,nu12,nu13,nu23,G12,G13,G23,rho in the axes of the mesh, or by a file ply.toml with the same
   keys, or `elasticity` (6 x 6, components xx, yy, zz, xy, xz, yz) and `rho`, and `axes` where the material is turned.
 """

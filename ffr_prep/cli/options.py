@@ -71,7 +71,7 @@ def numbers_of(settings: Sequence[str]) -> dict[str, float]:
         if "=" not in text:
             raise InputError(f"--set {text}: write it as NAME=VALUE")
     pairs = [text.partition("=") for text in settings]
-    return {name.strip(): number_of(f"--set {name}", value) for name, _, value in pairs}
+    return {name.strip(): number_of(f"--set {name} (in the unit of the script)", value) for name, _, value in pairs}
 
 
 def number_of(what: str, text: str) -> float:

@@ -117,6 +117,15 @@ def to_si(value: float, unit: str, expected: str | None = None) -> float:
     return value * factor
 
 
+def si_number(text: str, unit: str) -> float:
+    """A number as people write it, in SI units: "0.012" of this unit, or "12 mm".
+
+    Raises ValueError for a text that is no number; InputError as `to_si`, for a unit that is unknown or does not fit.
+    """
+    quantity = split_quantity(text)
+    return float(text) if quantity is None else to_si(*quantity, unit)
+
+
 def natural(unit: str, mass: float, length: float, time: float) -> float:
     """One of an SI unit made of a mass [kg], a length [m] and a time [s]: of "N" mass length / time^2."""
     roots = unit.count("sqrt(kg)")  # of elastic coordinates

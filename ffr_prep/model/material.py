@@ -9,6 +9,7 @@ Source: T. C. T. Ting, Anisotropic Elasticity (1996), chapter 2.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
@@ -21,6 +22,7 @@ from ffr_prep.body import TENSOR
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 from ffr_prep.common.reading import read_toml
+from ffr_prep.common.units import si_number
 
 Rows = tuple[tuple[float, ...], ...]
 
@@ -321,6 +323,7 @@ _FORMS: tuple[tuple[str, set[str], set[str], Callable[[str, Mapping[str, Any]], 
     ("", {"E", "nu", "rho"}, set(), _isotropic),
 )
 _NUMBERS = set().union(*(needed for _, needed, _, _ in _FORMS)) - {"elasticity"}
+_UNIT = re.compile(r"\[([^\]]+)\]")  # of a key, in brackets
 KEYS = {
     "name": "of the material; without it that of the file",
     "E": "Young's modulus [Pa]",
@@ -354,7 +357,7 @@ def _of_values(text: str, given: Mapping[str, Any], such: str) -> Solid:
 def _file(path: Path) -> dict[str, Any]:
     try:
         given = read_toml(path, "a material file")
-        return given | {key: float(given[key]) for key in given.keys() & _NUMBERS}
+        return given | {key: _number(str(path), key, given[key]) for key in given.keys() & _NUMBERS}
     except InputError:
         raise
     except (ValueError, TypeError, OverflowError) as error:
@@ -370,8 +373,11 @@ def _assignments(text: str) -> dict[str, str]:
     return dict(pairs)
 
 
-def _number(text: str, key: str, value: str) -> float:
+def _number(text: str, key: str, value: Any) -> float:
+    """In SI units; a text may have a unit of its own, such as 210 GPa."""
     try:
-        return float(value)
-    except ValueError:
+        return si_number(value, _UNIT.findall(KEYS[key])[-1]) if isinstance(value, str) else float(value)
+    except InputError as error:
+        raise InputError(f"material {text!r}: {key}: {error}") from None
+    except (ValueError, TypeError):
         raise InputError(f"material {text!r}: {key} is {value!r}, which is not a number") from None

@@ -160,8 +160,8 @@ def _explained(wrong: Mapping[str, Any], tree: Mapping[str, Any]) -> str:
     where = ".".join(entry_keys(wrong, tree)) or "the file"
     plain = not isinstance(wrong["input"], dict) and wrong["type"] != "missing"
     value = f" (it is {wrong['input']!r})" if plain else ""
-    in_si = "; write it without a unit, in SI units" if wrong["type"] == "float_parsing" else ""
-    return f"{where}: {complaint(wrong)}{value}{in_si}"
+    plain_number = "; write it without a unit" if wrong["type"] == "float_parsing" else ""
+    return f"{where}: {complaint(wrong)}{value}{plain_number}"
 
 
 # ---- parts --------------------------------------------------------------------------------------------------------

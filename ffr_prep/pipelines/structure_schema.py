@@ -5,11 +5,31 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, create_model, field_validator, model_validator
+from pydantic import BeforeValidator, Field, WithJsonSchema, create_model, field_validator, model_validator
 
 from ffr_prep.common.strict import Strict
+from ffr_prep.common.units import si_number, split_quantity
 from ffr_prep.reduction.registry import REDUCTIONS, method_of
 
+
+def _in(unit: str) -> BeforeValidator:
+    """Takes a text with a unit of this dimension, "12 mm", for a number in SI units."""
+
+    def si(value: Any) -> Any:
+        return si_number(value, unit) if isinstance(value, str) and split_quantity(value) else value
+
+    return BeforeValidator(si)
+
+
+_WRITTEN = WithJsonSchema({"anyOf": [{"type": "number"}, {"type": "string"}]})
+Metres = Annotated[float, _in("m"), _WRITTEN]
+Area = Annotated[float, _in("m^2"), _WRITTEN]
+SecondMoment = Annotated[float, _in("m^4"), _WRITTEN]
+Pascals = Annotated[float, _in("Pa"), _WRITTEN]
+Density = Annotated[float, _in("kg/m^3"), _WRITTEN]
+Hertz = Annotated[float, _in("Hz"), _WRITTEN]
+Seconds = Annotated[float, _in("s"), _WRITTEN]
+Point = tuple[Metres, Metres, Metres]
 Vector = tuple[float, float, float]
 
 
@@ -20,8 +40,8 @@ class RectangleEntry(Strict):
     """
 
     shape: Literal["rectangle"]
-    b: float
-    h: float
+    b: Metres
+    h: Metres
 
 
 class CircleEntry(Strict):
@@ -31,7 +51,7 @@ class CircleEntry(Strict):
     """
 
     shape: Literal["circle"]
-    d: float
+    d: Metres
 
 
 class TubeEntry(Strict):
@@ -41,8 +61,8 @@ class TubeEntry(Strict):
     """
 
     shape: Literal["tube"]
-    d: float
-    t: float
+    d: Metres
+    t: Metres
 
 
 class IEntry(Strict):
@@ -53,10 +73,10 @@ class IEntry(Strict):
     """
 
     shape: Literal["i"]
-    h: float
-    b: float
-    web: float
-    flange: float
+    h: Metres
+    b: Metres
+    web: Metres
+    flange: Metres
 
 
 class GeneralEntry(Strict):
@@ -68,10 +88,10 @@ class GeneralEntry(Strict):
     """
 
     shape: Literal["general"]
-    A: float
-    Iy: float
-    Iz: float
-    J: float
+    A: Area
+    Iy: SecondMoment
+    Iz: SecondMoment
+    J: SecondMoment
     ky: float | None = None
     kz: float | None = None
 
@@ -85,9 +105,9 @@ class MaterialEntry(Strict):
     E : Young's modulus [Pa];  nu : Poisson's ratio [1];  rho : density [kg/m^3]
     """
 
-    E: float
+    E: Pascals
     nu: float
-    rho: float
+    rho: Density
 
 
 class MemberEntry(Strict):
@@ -103,7 +123,7 @@ class MemberEntry(Strict):
     section: SectionEntry
     material: str
     orientation: Vector | None = None
-    offset: tuple[float, float] = (0.0, 0.0)
+    offset: tuple[Metres, Metres] = (0.0, 0.0)
     shear: bool = True
 
 
@@ -115,7 +135,7 @@ class ShellEntry(Strict):
     rotary_inertia : false leaves out that of the thickness
     """
 
-    thickness: float
+    thickness: Metres
     material: str
     rotary_inertia: bool = True
 
@@ -144,7 +164,7 @@ class PolylineEntry(Strict):
     """
 
     member: str
-    corners: list[Vector]
+    corners: list[Point]
     elements: int = 1
 
 
@@ -158,7 +178,7 @@ class PanelEntry(Strict):
     """
 
     shell: str
-    corners: list[Vector]
+    corners: list[Point]
     elements: tuple[int, int]
     triangles: bool = False
 
@@ -173,7 +193,7 @@ class InterfaceEntry(Strict):
 
     region: str | None = None
     kind: Literal["rigid", "mean"] = "rigid"
-    point: Vector | None = None
+    point: Point | None = None
 
 
 class SupportEntry(Strict):
@@ -242,8 +262,8 @@ class ReductionEntry(Strict):
 
     method: str = next(iter(REDUCTIONS)).name
     modes: int | None = Field(default=None, ge=0)
-    frequency: float | None = None
-    accuracy: tuple[float, float, float] | None = None
+    frequency: Hertz | None = None
+    accuracy: tuple[Hertz, Hertz, float] | None = None
 
     @field_validator("method")
     @classmethod
@@ -288,7 +308,7 @@ class CutEntry(Strict):
     normal : points to the next part [1]
     """
 
-    point: Vector
+    point: Point
     normal: Vector
 
 
@@ -301,9 +321,9 @@ class DampingEntry(Strict):
     ratios : of the modes by rising frequency, the last of all others [1]
     """
 
-    rayleigh: tuple[float, float] = (0.0, 0.0)
+    rayleigh: tuple[Hertz, Seconds] = (0.0, 0.0)
     loss_factor: float = 0.0
-    bands: list[tuple[float, float]] = []
+    bands: list[tuple[Hertz, float]] = []
     ratios: list[float] = []
 
 
@@ -338,7 +358,7 @@ class StructureEntry(Strict):
     materials: dict[str, MaterialEntry] = {}
     members: dict[str, MemberEntry] = {}
     shells: dict[str, ShellEntry] = {}
-    nodes: dict[str, Vector] = {}
+    nodes: dict[str, Point] = {}
     interfaces: dict[str, InterfaceEntry] = {}
     solids: dict[str, SolidEntry] = {}
     ties: list[tuple[str, str]] = []
@@ -347,9 +367,9 @@ class StructureEntry(Strict):
     linear: bool = False
     drawn_modes: int | None = None
     stress: bool = False
-    quality: tuple[float, float] | None = None
+    quality: tuple[Hertz, Hertz] | None = None
     damping: DampingEntry = DampingEntry()
-    parts: int | list[float | CutEntry] | None = None
+    parts: int | list[Metres | CutEntry] | None = None
 
     @model_validator(mode="before")
     @classmethod

@@ -498,7 +498,7 @@ def test_entries_of_structure_files_and_of_scenes_are_varied(tmp_path):
     ffr_prep.cli.main(["reduce-structure", str(tmp_path / "strip.toml"), "-o", str(tmp_path / "strip.ffr")])
     study = fd.study(
         tmp_path / "hanging.toml",
-        {"d": [0.01, 0.02], "gravity.2": [-9.81, -1.62]},
+        {"d": ["10 mm", "20 mm"], "gravity.2": [-9.81, -1.62]},
         {"sag": "strip.b.displacement.y: last", "stable": "stable: attribute"},
         bodies={"strip": "reduce-structure strip.toml -p members.bar.section.d=${d}"},
         folder=tmp_path,

@@ -39,6 +39,7 @@ def test_unknown_name_without_near_ones_lists_the_library():
 def test_text_form():
     assert parse_material("E=7e10, nu=0.3, rho=5540, name=strip") == Material("strip", 7e10, 0.3, 5540.0)
     assert parse_material("steel") == material("steel")
+    assert parse_material("E=70 GPa,nu=0.3,rho=5.54 g/cm^3,name=strip").E == 7e10
 
 
 @pytest.mark.parametrize(
@@ -47,6 +48,8 @@ def test_text_form():
         ("E=7e10,nu=0.3", "'rho' missing"),
         ("E=7e10,nu=0.3,rho=1,G=1", "unknown 'G'"),
         ("E=soft,nu=0.3,rho=1000", "E is 'soft'"),
+        ("E=70 mm,nu=0.3,rho=1000", "E: the unit 'mm' does not fit: this is given in Pa"),
+        ("E=70 GPo,nu=0.3,rho=1000", "E: unknown unit 'GPo'"),
         ("E=7e10,E=8e10,nu=0.3,rho=1000", "twice"),
         ("E=7e10,nu=0.3,rho=-1", "density rho is -1"),
     ],

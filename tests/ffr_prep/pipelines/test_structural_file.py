@@ -244,9 +244,11 @@ def test_ties_that_cannot_be(tmp_path, old, new, says):
         (LINE.replace('"circle"', '"round"'), "members.bar.section: .*'round'"),
         (LINE.replace("d = 0.01", "d = nan"), "members.bar.section.d: must be a finite number"),
         (
-            LINE.replace("d = 0.01", "d = '10 mm'"),
-            r"d: must be a number \(it is '10 mm'\); write it without a unit, in SI",
+            LINE.replace("d = 0.01", "d = '10 kg'"),
+            r"d: the unit 'kg' does not fit: this is given in m \(it is '10 kg'\)",
         ),
+        (LINE.replace("d = 0.01", "d = '10 mn'"), "d: unknown unit 'mn'"),
+        (LINE.replace("d = 0.01", "d = '10 + 1'"), r"d: must be a number \(it is '10 \+ 1'\); write it without a unit"),
         (LINE.replace(", d = 0.01", ""), "members.bar.section.d: is required, and missing"),
         (LINE.replace("elements = 2", "elements = 2.5"), r"polylines.1.elements: must be a whole number \(it is 2.5\)"),
         (LINE.replace("d = 0.01", "d = -0.01"), "bar.toml: section circle -0.01 m: d is -0.01 m"),
@@ -262,6 +264,15 @@ def test_ties_that_cannot_be(tmp_path, old, new, says):
 def test_files_that_cannot_be_used(tmp_path, text, says):
     with pytest.raises(InputError, match=says):
         read_structure(written(tmp_path, text))
+
+
+def test_numbers_may_have_units(tmp_path):
+    plain = "reduction = {modes = 2}\n[materials.own]\nE = 2.1e11\nnu = 0.3\nrho = 7850.0\n" + LINE.replace('"steel"', '"own"')
+    given = plain.replace("2.1e11", '"210 GPa"').replace("7850.0", '"7.85 g/cm^3"').replace("d = 0.01", 'd = "1 cm"')
+    assert given != plain
+    first, second = (body_of(written(tmp_path, text)) for text in (plain, given))
+    assert first.mass == pytest.approx(second.mass, rel=1e-14)
+    np.testing.assert_allclose(first.omega2, second.omega2, rtol=1e-9)
 
 
 def test_a_missing_file_ends_the_command_with_code_2_and_writes_nothing(tmp_path, capsys):
