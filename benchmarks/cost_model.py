@@ -18,11 +18,11 @@ from ffr_gallery.scene_set import chain, four_bar, slider_crank
 from scipy.optimize import nnls
 
 from ffr_dyn.analyses.integration import integrate
-from ffr_dyn.consistency.assemble import assemble
 from ffr_dyn.economy.model_choice import Choice, full, held_in_plane
 from ffr_dyn.economy.run import Span, make
 from ffr_dyn.functions.stopwatch import Stopwatch
 from ffr_dyn.scene.scene import Scene
+from ffr_dyn.variants.plane import planar_forms
 from ffr_dyn.variants.variant import STIFFENING
 from ffr_prep.common.errors import ComputationError
 
@@ -53,8 +53,8 @@ class Timing:
 def models(scene: Scene) -> Iterator[Choice]:
     """In space, and in the plane where there is one; by method, modes and terms."""
     space = full(scene, "ros3", 1)
-    flat = held_in_plane(space, assemble(scene).system.scene)
-    for base in (space,) if flat is None else (space, flat):
+    flat = (held_in_plane(space, form) for form in planar_forms(scene))
+    for base in (space, *(choice for choice in flat if choice is not None)):
         for count in COUNTS:
             for dropped in DROPPED if count else ((),):
                 parts = tuple(
