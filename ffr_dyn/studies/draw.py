@@ -30,7 +30,7 @@ def plot_study(table: Table, folder: str | Path, outputs: Sequence[str] = ()) ->
         <output>-mean.png      its mean over the first runs with 95 % confidence, and its distribution
         pairs.png              all parameters and outputs against each other
 
-    Of a history <output>.png has the rows of all runs.
+    Of a history <output>.png has the rows of all runs, in the colour of the parameter that changes their mean most.
 
     The tornado is that of a linear fit; R^2 in its title says how linear the output is. Raises InputError for unknown names.
 
@@ -53,8 +53,8 @@ def _drawn(table: Table, names: list[str], varied: dict[str, Array], folder: Pat
     label = {name: bracketed(name, pretty(table.units.get(name, ""))) for name in (*varied, *table.outputs)}
     varied = {label[name]: values for name, values in varied.items()}
     for name in names:
-        if name not in numbers and name != TIME:
-            yield _histories(folder / f"{name}.png", label[name], table.outputs[TIME], table.outputs[name])
+        if name not in numbers and name != TIME and np.isfinite(table.outputs[name]).any():
+            yield _histories(folder / f"{name}.png", label[name], table.outputs[TIME], table.outputs[name], varied)
     for name in numbers:
         done = np.isfinite(table.outputs[name])
         y, x = table.outputs[name][done], {key: values[done] for key, values in varied.items()}
@@ -65,7 +65,7 @@ def _drawn(table: Table, names: list[str], varied: dict[str, Array], folder: Pat
         yield _tornado(folder / f"{name}-tornado.png", label[name], changes, share)
         yield _mean(folder / f"{name}-mean.png", label[name], table.outputs[name])
         if len(x) > 1:
-            first, second = sorted(changes, key=lambda key: -abs(changes[key]))[:2]
+            first, second = changing_most(x, y)[:2]
             if _spans(x[first], x[second]):
                 yield _surface(folder / f"{name}-surface.png", label[name], (first, x[first]), (second, x[second]), y)
     yield _pairs(folder / "pairs.png", {**varied, **{label[name]: table.outputs[name] for name in numbers}})
@@ -86,6 +86,12 @@ def tornado(parameters: dict[str, Array], y: Array) -> tuple[dict[str, float], f
     return dict(zip(parameters, fit[1:].tolist(), strict=True)), share
 
 
+def changing_most(parameters: dict[str, Array], y: Array) -> list[str]:
+    """The parameters, those first that change the linear fit of `tornado` most."""
+    changes, _ = tornado(parameters, y)
+    return sorted(changes, key=lambda key: -abs(changes[key]))
+
+
 def _spans(x: Array, y: Array) -> bool:
     """Whether points are no line, so that they can be triangulated."""
     at = (
@@ -99,12 +105,23 @@ def _spans(x: Array, y: Array) -> bool:
 # ---- one picture ----------------------------------------------------------------------------------------------------
 
 
-def _histories(path: Path, name: str, time: Array, y: Array) -> Path:
-    from ffr_dyn.pictures.histories import PALETTE, drawing
+def _histories(path: Path, name: str, time: Array, y: Array, varied: dict[str, Array]) -> Path:
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.collections import LineCollection
 
+    from ffr_dyn.pictures.histories import drawing
+
+    done = np.isfinite(y[:, 0])
+    time, y, x = time[done], y[done], {key: values[done] for key, values in varied.items()}
+    key = changing_most(x, np.nanmean(y, axis=1))[0]
     with drawing(path, (8.0, 4.0)) as figure:
         axes = figure.subplots()
-        axes.plot(time.T, y.T, color=PALETTE[0], lw=0.8, alpha=min(1.0, MANY / len(y)))
+        lines = LineCollection(
+            list(np.stack([time, y], axis=-1)), array=x[key], lw=0.8, alpha=min(1.0, MANY / max(len(y), 1))
+        )
+        axes.add_collection(lines)
+        axes.autoscale()
+        figure.colorbar(ScalarMappable(lines.norm, lines.cmap), ax=axes, label=key)  # not as faint as the lines
         axes.set(xlabel="time [s]", ylabel=name)
     return path
 
@@ -153,7 +170,7 @@ def _surface(path: Path, name: str, first: tuple[str, Array], second: tuple[str,
         axes = figure.subplots()
         filled = axes.tricontourf(at[:, 0], at[:, 1], mean, levels=LEVELS)
         figure.colorbar(filled, ax=axes, label=name)
-        axes.plot(at[:, 0], at[:, 1], "k.", markersize=2)
+        axes.plot(at[:, 0], at[:, 1], "k.", markersize=4, clip_on=False)
         axes.set(xlabel=first[0], ylabel=second[0])
         axes.locator_params(nbins=TICKS)
     return path

@@ -17,7 +17,7 @@ import ffr_dyn as fd
 import ffr_prep.cli
 from ffr_dyn.results.result import Quantity, Result
 from ffr_dyn.studies import draw
-from ffr_dyn.studies.draw import running_mean, tornado
+from ffr_dyn.studies.draw import changing_most, running_mean, tornado
 from ffr_dyn.studies.measures import attribute, measured
 from ffr_dyn.studies.plan import mark
 from ffr_dyn.studies.runs import Row, body_file
@@ -92,7 +92,7 @@ def test_the_file_has_dimensions_and_coordinates(folder):
 
 
 @pytest.mark.slow
-def test_whole_histories_are_rows_of_a_dimension_of_their_own(folder):
+def test_whole_histories_are_rows_of_a_dimension_of_their_own(folder, monkeypatch):
     """Of runs of unequal length, too; the table is the same when it is made by workers."""
     parameters = {"g": [1.0, 9.81], "analysis.end": [0.1, 0.2], "bodies.bar.mass": [1.0]}
     outputs = {"h": "hinge.angle: history", "last": "hinge.angle: last", "free": "degrees_of_freedom: attribute"}
@@ -114,7 +114,10 @@ def test_whole_histories_are_rows_of_a_dimension_of_their_own(folder):
     with h5py.File(folder / "t.nc") as file:
         assert [scale[0] for scale in file["h"].dims] == [file["run"], file["row"]]
     assert fd.load_table(folder / "t.nc")["h"].shape == (4, 21)
+    coloured = []
+    monkeypatch.setattr(draw, "changing_most", lambda x, y: coloured.append(changing_most(x, y)) or coloured[-1])
     assert {path.name for path in fd.plot_study(table, folder / "p", ["h"])} == {"h.png", "pairs.png"}
+    assert coloured == [["analysis.end", "g"]]
 
 
 def test_attributes_are_found_by_the_path_of_their_keys():

@@ -267,7 +267,9 @@ def test_files_that_cannot_be_used(tmp_path, text, says):
 
 
 def test_numbers_may_have_units(tmp_path):
-    plain = "reduction = {modes = 2}\n[materials.own]\nE = 2.1e11\nnu = 0.3\nrho = 7850.0\n" + LINE.replace('"steel"', '"own"')
+    plain = "reduction = {modes = 2}\n[materials.own]\nE = 2.1e11\nnu = 0.3\nrho = 7850.0\n" + LINE.replace(
+        '"steel"', '"own"'
+    )
     given = plain.replace("2.1e11", '"210 GPa"').replace("7850.0", '"7.85 g/cm^3"').replace("d = 0.01", 'd = "1 cm"')
     assert given != plain
     first, second = (body_of(written(tmp_path, text)) for text in (plain, given))
