@@ -22,7 +22,7 @@ from ffr_prep.cli import main
 from ffr_prep.cli.matrices import reduce_matrices_command
 from ffr_prep.common.errors import InputError
 from ffr_prep.matrices.model import MatrixModel, row_in_words, with_group
-from ffr_prep.matrices.nastran import GridTable, grids_of_deck, grids_of_op2, model_of_nastran
+from ffr_prep.matrices.nastran import GridTable, grids_of_deck, grids_of_op2, model_of_nastran, rigid_of_deck
 from ffr_prep.matrices.npz import save_matrices
 from ffr_prep.matrices.readers import read_matrices
 from ffr_prep.matrices.unit_systems import UNIT_SYSTEMS
@@ -82,7 +82,15 @@ def test_npz_and_back(model, tmp_path):
     assert list(tmp_path.iterdir()) == [path]
 
 
-@pytest.mark.parametrize("form", ["dense", "csr", "csc", "coo", "triangle"])
+def one_of_each_pair(A: sp.csr_array) -> sp.coo_array:
+    """One triangle of a symmetric matrix whose rows are in another order than that in which it was written."""
+    order = np.random.default_rng(3).permutation(A.shape[0])
+    one = A.tocoo()
+    kept = order[one.row] >= order[one.col]
+    return sp.coo_array((one.data[kept], (one.row[kept], one.col[kept])), shape=A.shape)
+
+
+@pytest.mark.parametrize("form", ["dense", "csr", "csc", "coo", "triangle", "either"])
 def test_npz_by_hand(model, tmp_path, form):
     """What a user writes: dense arrays, or the members that scipy.sparse.save_npz writes, under K/ and M/."""
     arrays = {
@@ -96,7 +104,7 @@ def test_npz_by_hand(model, tmp_path, form):
         if form == "dense":
             arrays[name] = A.toarray()
             continue
-        one = sp.tril(A, format="csr") if form == "triangle" else A.asformat(form)
+        one = {"triangle": sp.tril, "either": one_of_each_pair}.get(form, lambda A: A.asformat(form))(A)
         sp.save_npz(tmp_path / "part.npz", one)
         with np.load(tmp_path / "part.npz") as stored:
             arrays |= {f"{name}/{key}": stored[key] for key in stored.files}
@@ -105,7 +113,7 @@ def test_npz_by_hand(model, tmp_path, form):
     for name in ("K", "M"):
         np.testing.assert_array_equal(getattr(back, name).toarray(), getattr(model, name).toarray())
     assert list(back.groups) == ["a"]
-    assert any("one triangle" in note for note in back.notes) == (form == "triangle")
+    assert any("one triangle" in note for note in back.notes) == (form in ("triangle", "either"))
 
 
 def test_units_of_a_file(model, tmp_path):
@@ -529,6 +537,18 @@ def test_points_of_bulk_data(model):
     assert table.labels.tolist() == [13, 23, 25, 33, 43, 53, 63, 73, 83, 93]
     assert table.kinds.tolist() == [1, 1, 2] + [1] * 7
     assert {name: of.tolist() for name, of in table.groups.items()} == {"set_10": [13, 23]}
+
+
+def test_rigid_elements_of_bulk_data_are_told(model):
+    """Nastran ties their nodes after KGG."""
+    elements = {1: SimpleNamespace(type="RBE2"), 2: SimpleNamespace(type="RBE2"), 3: SimpleNamespace(type="RBE3")}
+    (note,) = rigid_of_deck(SimpleNamespace(rigid_elements=elements, mpcs={7: []}))
+    assert note.startswith(
+        "2 RBE2, 1 RBE3, 1 MPC left out: rigid and averaging connections; make their nodes an interface"
+    )
+    assert rigid_of_deck(SimpleNamespace(rigid_elements={}, mpcs={})) == ()
+    held = {"KGG": SimpleNamespace(data=model.K), "MGG": SimpleNamespace(data=model.M)}
+    assert model_of_nastran(Path("run.op4"), held, grids(model), {}, [note]).notes == (note,)
 
 
 # ---- Nastran: files, where pyNastran is installed -----------------------------------------------------------------
