@@ -64,7 +64,10 @@ def from_matrices(
         return nodal_integrals(model.points, model.dofs, model.M, ties @ basis)[0]
 
     def doubts(basis: Array) -> list[str]:
-        return [] if m is not None else _doubts(nodal_integrals(model.points, model.dofs, model.M, ties @ basis)[1])
+        damped = _overdamped(model, ties @ basis)
+        return damped + (
+            [] if m is not None else _doubts(nodal_integrals(model.points, model.dofs, model.M, ties @ basis)[1])
+        )
 
     return Model(
         coupled=coupled,
@@ -121,6 +124,19 @@ def _damping_notes(model: MatrixModel) -> list[str]:
     rigid = rigid_motions(model.points, model.dofs)
     of_rigid, of_all = abs(model.C @ rigid).max(), abs(model.C).max() * abs(rigid).max()
     return ["C damps rigid motions too; of a body what deforms it is damped"] if of_rigid > 1e-9 * of_all else []
+
+
+def _overdamped(model: MatrixModel, Phi: Array) -> list[str]:
+    """Of the modes Phi (D, n) of unit mass: a note where C leaves none that vibrates."""
+    if model.C is None or not Phi.size:
+        return []
+    stiffness, damping = (np.einsum("dn,dn->n", Phi, A @ Phi) for A in (model.K, model.C))
+    ratio = float((damping / (2 * np.sqrt(np.maximum(stiffness, np.finfo(float).tiny)))).min())
+    return [
+        f"C damps every mode by {ratio:.3g} of its critical damping or more, so that none vibrates: is C in the units of the "
+        "other matrices, and is their order K, M, C?"
+        for _ in range(ratio > 1)
+    ]
 
 
 def _doubts(defect: Array) -> list[str]:

@@ -779,3 +779,14 @@ def test_the_example_of_the_documentation(tmp_path, monkeypatch):
 def test_the_command_offers_all_units():
     offered = next(option for option in reduce_matrices_command.params if option.name == "units")
     assert tuple(offered.type.choices) == tuple(UNIT_SYSTEMS)
+
+
+def test_a_damping_matrix_that_lets_nothing_vibrate_is_told(model):
+    """Stiffness in its place, as where files are given in another order."""
+    request = fp.Request(name="body", reference=MeanAxis(), reduction=Eigenmodes(2))
+    for C, told in ((1e-8 * model.K, 0), (model.K, 1)):
+        body = fp.reduce(fp.from_matrices(replace(model, C=sp.csr_array(C)), ()), request)
+        said = [w for w in body.provenance["warnings"] if "is their order K, M, C?" in w]
+        assert len(said) == told
+        ratio = body.damping.diagonal() / (2 * np.sqrt(body.omega2))
+        assert all(f"every mode by {ratio.min():.3g} of its critical damping" in w for w in said)
