@@ -12,6 +12,8 @@ from ffr_prep.body.reduced import BeamForces, BodyError, FlexibleBody, Interface
 from ffr_prep.body.second_order import pair_values, recoordinated
 from ffr_prep.common.arrays import Array, ArrayLike
 
+MOVED_POINTS = "moved_points"  # of the provenance: where points were asked for that have no surface near
+_OFF = 0.05  # of the size of a body: how far from its place a point is put without a word
 _MOST = 1e60  # of masses, moments and lengths in SI units, so that their products are numbers still
 
 
@@ -130,6 +132,8 @@ def with_point(body: FlexibleBody, name: str, position: ArrayLike) -> FlexibleBo
     surface. Nothing is added to the basis: what the node does under load is what the basis can show. A body with load
     matrices gets those of the point from the second-order displacement of its surface.
 
+    A node that is farther away than its neighbours, and than a twentieth of the size of the body, is told (`units_doubts`).
+
     Raises BodyError when the body has no surface, when it has load matrices and its surface no second-order displacement,
     or the position is farther from it than half the size of the body.
 
@@ -150,9 +154,19 @@ def with_point(body: FlexibleBody, name: str, position: ArrayLike) -> FlexibleBo
         stiffening = np.concatenate([stiffening, -second])
     point = Interface(name, points[node], Phi[node], phi_r)
     interfaces = (*body.interfaces, point)
-    return replace(
-        body, interfaces=interfaces, stiffening=stiffening, parts=_parts_with_point(body, name, points[node])
-    )
+    parts = _parts_with_point(body, name, points[node])
+    made = replace(body, interfaces=interfaces, stiffening=stiffening, parts=parts)
+    asked = np.asarray(position, float)
+    away, near = np.linalg.norm(asked - points[node]), np.linalg.norm(arms, axis=1).max(initial=0.0)
+    return _moved(made, name, asked.tolist()) if away > max(near, _OFF * body.size) else made
+
+
+def _moved(body: FlexibleBody, name: str, asked: list[float]) -> FlexibleBody:
+    """The body that knows where its point was asked for, and so does the part that has it."""
+    moved = {**body.provenance.get(MOVED_POINTS, {}), name: asked}
+    having = [any(i.name == name for i in part.interfaces) for part in body.parts]
+    parts = [_moved(p, name, asked) if has else p for p, has in zip(body.parts, having, strict=True)]
+    return replace(body, provenance={**body.provenance, MOVED_POINTS: moved}, parts=tuple(parts))
 
 
 def _parts_with_point(body: FlexibleBody, name: str, position: Array) -> tuple[FlexibleBody, ...]:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 
+from ffr_prep.body.constructors import MOVED_POINTS
 from ffr_prep.body.reduced import FlexibleBody, remembered
 
 _LONG = 100.0  # m
@@ -23,7 +24,7 @@ def units_doubts(body: FlexibleBody) -> list[str]:
 
     >>> fp.units_doubts(body)
     """
-    return [*remembered(body, "units doubts", lambda: (*_of_shape(body), *_of_points(body)))]
+    return [*remembered(body, "units doubts", lambda: (*_of_shape(body), *_of_points(body), *_of_places(body)))]
 
 
 def _of_shape(body: FlexibleBody) -> Iterator[str]:
@@ -62,3 +63,18 @@ def _of_points(body: FlexibleBody) -> Iterator[str]:
             f"its radius of gyration is {gyration:.3g} m and its farthest point {reach:.3g} m from its centre: is the "
             "inertia in kg mm^2? It is in kg m^2"
         )
+
+
+def _of_places(body: FlexibleBody) -> Iterator[str]:
+    """Of points that were asked for where the body has no surface near."""
+    asked_for = body.provenance.get(MOVED_POINTS, {})
+    for name, asked, at in ((i.name, asked_for[i.name], i.position) for i in body.interfaces if i.name in asked_for):
+        away = float(np.linalg.norm(np.array(asked) - at))
+        yield (
+            f"its point {name!r} was asked for at {_place(asked)} m and is where the surface is nearest, at {_place(at)} m, "
+            f"{away:.3g} m away: is that meant?"
+        )
+
+
+def _place(at: Iterable[float]) -> str:
+    return "(" + ", ".join(f"{x:.4g}" for x in at) + ")"

@@ -11,7 +11,8 @@ EQEXIN, GPDT).
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,6 +25,7 @@ from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 from ffr_prep.matrices.model import MatrixModel
 from ffr_prep.matrices.node_table import NodeTable, mirrored, model_of
+from ffr_prep.mesh.left_out import left_out_of_nastran
 
 _SETS = (("KGG", "MGG", "BGG"), ("KAA", "MAA", "BAA"))  # stiffness, mass and, optional, viscous damping
 _GRID, _SCALAR = 1, 2
@@ -58,7 +60,7 @@ def from_op4(matrices: Path, deck: Path) -> MatrixModel:
         from pyNastran.bdf.bdf import read_bdf
 
         bulk = read_bdf(str(deck), punch=_is_punch(deck), debug=None)
-    return model_of_nastran(matrices, found, grids_of_deck(bulk), {"format": "Nastran OP4"})
+    return model_of_nastran(matrices, found, grids_of_deck(bulk), {"format": "Nastran OP4"}, rigid_of_deck(bulk))
 
 
 def from_op2(path: Path) -> MatrixModel:
@@ -73,7 +75,9 @@ def from_op2(path: Path) -> MatrixModel:
     return model_of_nastran(path, results.matrices, grids_of_op2(path, results), {"format": "Nastran OP2"})
 
 
-def model_of_nastran(path: Path, found: Mapping[str, Any], grids: GridTable, source: Mapping[str, Any]) -> MatrixModel:
+def model_of_nastran(
+    path: Path, found: Mapping[str, Any], grids: GridTable, source: Mapping[str, Any], notes: Sequence[str] = ()
+) -> MatrixModel:
     """The model of matrices by name, as pyNastran holds them in `data`, and the points of the g-set."""
     names = _names(path, found)
     for name in names:
@@ -99,7 +103,7 @@ def model_of_nastran(path: Path, found: Mapping[str, Any], grids: GridTable, sou
     table = NodeTable(labels, grids.points[grid], grids.groups)
     K, M, *C = (A[kept][:, kept] for A in matrices)
     left = ["K4GG, the structural damping, is left out: give a loss factor"] if "K4GG" in found else []
-    return model_of(path, table, rows, K, M, {**source, "matrices": ", ".join(names)}, left, *C)
+    return model_of(path, table, rows, K, M, {**source, "matrices": ", ".join(names)}, [*left, *notes], *C)
 
 
 # ---- points -------------------------------------------------------------------------------------------------------
@@ -118,6 +122,14 @@ def grids_of_deck(deck: Any) -> GridTable:
     }
     groups = {name: of for name, of in sets.items() if np.isin(of, labels[is_grid]).all()}
     return GridTable(labels, np.where(is_grid, _GRID, _SCALAR), points, systems, groups)
+
+
+def rigid_of_deck(deck: Any) -> tuple[str, ...]:
+    """A note on rigid elements and multi-point constraints of bulk data as pyNastran holds them: Nastran eliminates their
+    nodes after KGG, which knows nothing of them."""
+    found = Counter(one.type for one in deck.rigid_elements.values())
+    found.update(MPC=len(deck.mpcs))
+    return left_out_of_nastran(+found)
 
 
 def grids_of_op2(path: Path, results: Any) -> GridTable:

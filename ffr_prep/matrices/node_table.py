@@ -77,13 +77,14 @@ def _indices(index: Mapping[int, int], labels: Array, what: str) -> Array:
 
 
 def mirrored(name: str, A: sp.sparray) -> tuple[sp.csr_array, list[str]]:
-    """The whole of a symmetric matrix of which one triangle may have been given, and a note when it was."""
+    """The whole of a symmetric matrix of which one triangle may have been given, in whatever order of its rows, and a note
+    when it was: no entry has another across the diagonal."""
     A = sp.csr_array(A)
     if A.shape[0] != A.shape[1]:
         return A, []
-    strict = [sp.csr_array(part) for part in (sp.tril(A, -1), sp.triu(A, 1))]
-    for part in strict:
-        part.eliminate_zeros()
-    if all(part.nnz for part in strict) or not any(part.nnz for part in strict):
+    off = sp.csr_array(A - sp.diags_array(A.diagonal()))
+    off.eliminate_zeros()
+    there = abs(off).sign()
+    if not off.nnz or there.multiply(there.T).nnz:
         return A, []
-    return sp.csr_array(A + strict[0].T + strict[1].T), [f"{name} was given by one triangle and made symmetric"]
+    return sp.csr_array(A + off.T), [f"{name} was given by one triangle and made symmetric"]

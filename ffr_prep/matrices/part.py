@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from typing import NoReturn
 
 import numpy as np
+import scipy.sparse as sp
 
 from ffr_prep.body import Surface
 from ffr_prep.body.provenance import described
@@ -63,9 +64,6 @@ def from_matrices(
             return scalar_integrals(model.points, model.dofs, m, ties @ basis)
         return nodal_integrals(model.points, model.dofs, model.M, ties @ basis)[0]
 
-    def doubts(basis: Array) -> list[str]:
-        return [] if m is not None else _doubts(nodal_integrals(model.points, model.dofs, model.M, ties @ basis)[1])
-
     return Model(
         coupled=coupled,
         inertia=inertia,
@@ -91,7 +89,7 @@ def from_matrices(
             "warnings": precision_warnings(model),
         },
         packages=("ffr", "numpy", "scipy"),
-        doubts=doubts,
+        doubts=lambda basis: [*_overdamped(model, ties @ basis), *_doubts(model, m, ties @ basis)],
         damping=lambda basis: _damping(model, ties @ basis),
         massless=mass_is_singular(model),
         unstressed=True,
@@ -123,7 +121,24 @@ def _damping_notes(model: MatrixModel) -> list[str]:
     return ["C damps rigid motions too; of a body what deforms it is damped"] if of_rigid > 1e-9 * of_all else []
 
 
-def _doubts(defect: Array) -> list[str]:
+def _overdamped(model: MatrixModel, Phi: Array) -> list[str]:
+    """Of the modes Phi (D, n) of unit mass: a note where C leaves none that vibrates."""
+    if model.C is None or not Phi.size:
+        return []
+    stiffness, damping = (np.einsum("dn,dn->n", Phi, A @ Phi) for A in (model.K, model.C))
+    ratio = float((damping / (2 * np.sqrt(np.maximum(stiffness, np.finfo(float).tiny)))).min())
+    return [
+        f"C damps every mode by {ratio:.3g} of its critical damping or more, so that none vibrates: is C in the units of the "
+        "other matrices, and is their order K, M, C?"
+        for _ in range(ratio > 1)
+    ]
+
+
+def _doubts(model: MatrixModel, m: sp.csr_array | None, Phi: Array) -> list[str]:
+    """Of the modes Phi (D, n): those whose integrals a mass that is not one scalar m for x, y and z does not give."""
+    if m is not None:
+        return []
+    defect = nodal_integrals(model.points, model.dofs, model.M, Phi)[1]
     doubtful = np.flatnonzero(defect > _DOUBTFUL)
     if not doubtful.size:
         return []

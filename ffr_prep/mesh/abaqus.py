@@ -29,7 +29,7 @@ Row = list[str]
 # Corners of the faces S1, S2, ... of tetrahedra and hexahedra. The node order of the elements is that of VTK.
 _TET_FACES = ((0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0))
 _HEX_FACES = ((0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0))
-_SOLID = re.compile(r"(?:C3D|DC3D|AC3D)(\d+)")
+_SOLID = re.compile(r"(?:C3D|DC3D)(\d+)")
 _PLANE = re.compile(r"(?:S|SC|STRI|CPS|CPE|CPEG|CAX|M3D|SFM3D|R3D|DS|DC2D)(3|4|6|8|9|65)(?!\d)")
 _CORNERS = {3: 3, 6: 3, 65: 3, 4: 4, 8: 4, 9: 4}
 _MAKING = ("NGEN", "NFILL", "NCOPY", "NMAP", "ELGEN", "ELCOPY", "SYSTEM")

@@ -40,6 +40,7 @@ _LOADS = ("loads", "they belong to a scene")
 _DAMPING = ("damping", "give it by --rayleigh, --loss-factor or --damping")
 _TABLES = ("tables over temperature", "the constants are those of the card that they belong to")
 _NOT_LINEAR = ("yield and creep", "bodies are linearly elastic")
+_FLUID = ("acoustic elements", "a body is solid; what the fluid weighs is a mass of the scene, what it presses a load")
 _MATRICES = ("matrices", "take K and M of the whole model: ffr-prep reduce-matrices")
 
 # Keywords with their star, types of elements without.
@@ -47,6 +48,7 @@ _ABAQUS = (
     _Kind(r"(SPRING|DASHPOT|CONN|JOINTC|GAP|ITT|ITS)[A-Z0-9]*", *_SPRINGS),
     _Kind(r"MASS|ROTARYI|HEATCAP|\*NONSTRUCTURAL MASS|\*MASS ADJUST", *_MASSES),
     _Kind(r"(B|PIPE|ELBOW|FRAME|T)\d[A-Z0-9]*", *_BEAMS),
+    _Kind(r"AC3D\d+[A-Z]*", *_FLUID),
     _Kind(r"\*(SHELL|MEMBRANE|SHELL GENERAL) SECTION", *_SHELLS),
     _Kind(
         r"DCOUP3D|\*RIGID BODY|\*(KINEMATIC |DISTRIBUTING )?COUPLING|\*MPC|\*EQUATION|\*RIGID FACE|(R2D|R3D|RB2D|RB3D)\d",

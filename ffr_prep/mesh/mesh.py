@@ -34,6 +34,7 @@ from ffr_prep.mesh.file_mesh import DrawnFace, FileMesh
 from ffr_prep.mesh.formats import MOST_ELEMENTS, format_of
 from ffr_prep.mesh.geometry.drawn import face_of
 from ffr_prep.mesh.geometry.face import METRES, Face
+from ffr_prep.mesh.open_joints import nodes_on_edges
 
 _CHUNK = 4096
 _DEGENERATE = 1e-10
@@ -465,7 +466,18 @@ def _check_single(mesh: Mesh, doubled: Array) -> None:
 
 
 def misfit_doubts(mesh: Mesh) -> list[str]:
-    """Notes on places where elements of several kinds do not fit, so that the mesh opens there under load."""
+    """Notes on places where elements do not fit, so that the mesh opens there under load."""
+    loose = nodes_on_edges(mesh.points, boundary_faces(mesh))
+    open_there = [
+        f"at {len(loose)} nodes the mesh is open and too soft, the first at {_at(mesh.points[first])}: they lie on "
+        "edges of elements that do not have them; mesh the parts that meet there alike, so that they share their nodes"
+        for first in loose[:1]
+    ]
+    return [*_kinds_in_words(mesh), *open_there]
+
+
+def _kinds_in_words(mesh: Mesh) -> list[str]:
+    """Notes on places where elements of several kinds meet and do not fit."""
     if len(mesh.blocks) < 2:
         return []
     edges, squares = misfits(_pairs(mesh))

@@ -41,6 +41,7 @@ from ffr_prep.solvers.factor import CHOLESKY, FreeBody, Solver, SupportedBody, s
 from ffr_prep.solvers.threads import on_one_thread
 
 _MASSLESS = 1e-9
+_FAR = 20.0  # sizes of a model from which on a point of an interface is to blame for what fails
 _UNDEFORMED = "it has no shape to deform in, and moves as a rigid body: ask for modes, or for a higher frequency"
 _RIGID = 6  # coordinates of a body that does not deform
 UNDAMPED = Damping()
@@ -128,7 +129,20 @@ def reduce(
         return with_damping(whole, request.damping)
     except ComputationError:
         model.diagnose()
+        _check_points(model.coupled)
         raise
+
+
+def _check_points(model: CoupledModel) -> None:
+    """InputError where an interface is so far away from the nodes that its motions and theirs drown in rounding."""
+    size = float(np.linalg.norm(np.ptp(model.points, axis=0)))
+    for name, at in zip(model.names, model.positions, strict=True):
+        away = float(np.linalg.norm(model.points - at, axis=1).min())
+        if away > _FAR * size:
+            raise InputError(
+                f"the point of interface {name!r} is {away:.3g} m away from the nodes, which reach over {size:.3g} m: give "
+                "its place in metres, near its region"
+            )
 
 
 def _parts(model: Model, request: Request, progress: Stages, advance: Advance) -> Iterator[FlexibleBody]:

@@ -34,6 +34,8 @@ from ffr_prep.pipelines.tied_second_order import Eliminated, tied_second_order
 from ffr_prep.solvers.threads import on_one_thread
 from ffr_prep.structures.interfaces import rigid_coordinates
 
+_LONG_ARM = 0.1  # of a tie, of the size of the smaller part
+
 
 @dataclass(frozen=True)
 class _End:
@@ -99,7 +101,7 @@ def tied(parts: Mapping[str, Model], ties: Sequence[tuple[str, str]]) -> Model:
             },
             "ties": [list(pair) for pair in ties],
             WITHOUT_SHEAR: [name for part in parts.values() for name in part.record.get(WITHOUT_SHEAR, [])],
-            "warnings": [f"{name}: {w}" for name, part in parts.items() for w in part.record.get("warnings", [])],
+            "warnings": _warnings(parts, ties),
         },
         doubts=lambda basis: _doubts(parts, [x @ basis for x in own]),
         mesh_energy=lambda basis: _known_sum([m.mesh_energy(x @ basis) for m, x in zip(models, own, strict=True)]),
@@ -110,6 +112,26 @@ def tied(parts: Mapping[str, Model], ties: Sequence[tuple[str, str]]) -> Model:
 
 def _doubts(parts: Mapping[str, Model], bases: Sequence[Array]) -> list[str]:
     return [f"{name}: {d}" for (name, m), basis in zip(parts.items(), bases, strict=True) for d in m.doubts(basis)]
+
+
+def _warnings(parts: Mapping[str, Model], ties: Sequence[tuple[str, str]]) -> list[str]:
+    of_parts = (f"{name}: {w}" for name, part in parts.items() for w in part.record.get("warnings", []))
+    return [*of_parts, *_long_arms(parts, ties)]
+
+
+def _long_arms(parts: Mapping[str, Model], ties: Sequence[tuple[str, str]]) -> list[str]:
+    """Notes on ties of interfaces that are far from one another: most likely a part lies elsewhere than is meant."""
+    notes = []
+    for pair in ties:
+        sides = [(parts[part].coupled, interface) for part, _, interface in (name.partition(".") for name in pair)]
+        one, other = (model.positions[interface_index(model, interface)] for model, interface in sides)
+        size = min(np.linalg.norm(np.ptp(model.points, axis=0)) for model, _ in sides)
+        if (gap := np.linalg.norm(one - other)) > _LONG_ARM * size:
+            notes.append(
+                f"{pair[0]!r} and {pair[1]!r} are tied over {gap:.3g} m, by a rigid arm without mass: do both parts lie "
+                "where they are meant to? Places are those of their own files, in metres"
+            )
+    return notes
 
 
 def _known_sum(parts: Sequence[Array | None]) -> Array | None:

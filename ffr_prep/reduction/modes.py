@@ -69,11 +69,14 @@ def _expected(omega2: Array, limit: float) -> int:
 
 
 def _dense_modes(model: CoupledModel, C: Array, count: int) -> tuple[Array, Array]:
-    null = scipy.linalg.null_space(C)
-    omega2, vectors = scipy.linalg.eigh(
-        null.T @ (model.K @ null), null.T @ (model.M @ null), subset_by_index=(0, count - 1)
-    )
-    return omega2, null @ vectors
+    """In coordinates of unit stiffness: translations and rotations of bodies far smaller than a metre have stiffness and mass
+    of other orders, and combinations of both would lose the smaller ones in rounding."""
+    scale = 1 / np.sqrt(model.K.diagonal())
+    conditions = C * scale
+    null = scipy.linalg.null_space(conditions / np.linalg.norm(conditions, axis=1, keepdims=True))
+    K, M = (null.T @ (scale[:, None] * A.toarray() * scale) @ null for A in (model.K, model.M))
+    omega2, vectors = scipy.linalg.eigh(K, M, subset_by_index=(0, count - 1))
+    return omega2, scale[:, None] * (null @ vectors)
 
 
 def constraint_modes(model: CoupledModel, fixed: SupportedBody) -> tuple[Array, Array]:

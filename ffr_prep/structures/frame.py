@@ -19,6 +19,7 @@ from ffr_prep.common.errors import InputError
 from ffr_prep.common.in_words import extent_in_words
 from ffr_prep.common.reading import check_count
 from ffr_prep.mesh.geometry.node_regions import nodes_of_region
+from ffr_prep.mesh.open_joints import nodes_on_edges, nodes_on_faces
 from ffr_prep.model.material import Material, check_isotropic
 from ffr_prep.structures.sections import Section
 
@@ -423,6 +424,20 @@ def overlap_doubts(frame: Frame) -> list[str]:
         "stiffness; remove one where it is meant once"
         for what, found in (("beams", _doubled_beams(frame)), ("plates", _doubled_plates(frame)))
         if found
+    ]
+
+
+def joint_doubts(frame: Frame) -> list[str]:
+    """Notes on nodes that lie on beams or plates without being theirs, where parts look joined and are not."""
+    a, b, c, d = frame.quadrilaterals.T
+    triangles = np.vstack([frame.triangles, np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
+    kinds = [nodes for nodes in (frame.elements, *_plates(frame)) if len(nodes)]
+    on_edges = nodes_on_edges(frame.points, kinds)
+    loose = np.union1d(on_edges, nodes_on_faces(frame.points, triangles, np.arange(len(frame.points))))
+    return [
+        f"at {len(loose)} nodes nothing joins what looks joined, the first at {_at(frame.points[first])}: they lie on beams "
+        "or plates that have no node there; give both the same nodes, as by as many elements along a common edge"
+        for first in loose[:1]
     ]
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Container, Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -32,7 +32,7 @@ def read_frame(
     """A frame of beams and plates from the curves and surfaces of a file, in metres; geometry is meshed by gmsh first.
 
     members : what each group of curves is made of; curves without groups are named curve_1, curve_2, ... Where there are
-              shells, curves without a member are only edges
+              shells, curves without a member are only edges. A group of curves that are in groups with a member needs none
     shells  : what each group of surfaces is made of, named likewise; without shells, surfaces count for nothing
     unit, size, numbers, progress : as in `ffr_prep.mesh.mesh.read_mesh`; a curved bar becomes straight elements, a curved
               surface flat ones
@@ -89,7 +89,7 @@ def _check_shells(path: Path, found: LinesAndFaces, shells: Mapping[str, Shell])
     unknown = [name for name in shells if name not in filled]
     if unknown:
         raise InputError(f"{path} has no group of surfaces {unknown[0]!r}; {choice(unknown[0], dict.fromkeys(filled))}")
-    bare = [name for name in filled if name not in shells]
+    bare = _bare({name: found.faces[name] for name in filled}, shells)
     if bare:
         raise InputError(
             f"{path}: the group of surfaces {bare[0]!r} has no shell; say what it is made of, for example "
@@ -104,9 +104,20 @@ def _check_members(path: Path, lines: Mapping[str, Array], members: Mapping[str,
     unknown = [name for name in members if name not in filled]
     if unknown:
         raise InputError(f"{path} has no group of curves {unknown[0]!r}; {choice(unknown[0], dict.fromkeys(filled))}")
-    bare = [name for name in filled if name not in members]
+    bare = _bare({name: (lines[name],) for name in filled}, members)
     if needed and bare:
         raise InputError(
             f"{path}: the group of curves {bare[0]!r} has no member; say what it is made of, for example "
             f"members={{{bare[0]!r}: Member(tube(0.03, 0.002), material('steel'))}}"
         )
+
+
+def _bare(groups: Mapping[str, Sequence[Array]], made: Container[str]) -> list[str]:
+    """Groups with elements that nothing says what they are made of; a group of elements of other groups is one of nodes."""
+    known = {element for name, parts in groups.items() if name in made for element in _elements(parts)}
+    return [name for name, parts in groups.items() if name not in made and not known.issuperset(_elements(parts))]
+
+
+def _elements(parts: Sequence[Array]) -> Iterator[tuple[int, ...]]:
+    """The elements by their nodes, ascending."""
+    return (tuple(sorted(nodes)) for part in parts for nodes in part.tolist())

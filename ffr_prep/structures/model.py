@@ -33,7 +33,7 @@ from ffr_prep.model.second_order import SecondOrder
 from ffr_prep.solvers.threads import on_one_thread
 from ffr_prep.structures.cutting import cut_frame
 from ffr_prep.structures.element_families import Family, connectivity, element_values, families
-from ffr_prep.structures.frame import Frame, check_frame, frame_hash, overlap_doubts, thickness_doubts
+from ffr_prep.structures.frame import Frame, check_frame, frame_hash, joint_doubts, overlap_doubts, thickness_doubts
 from ffr_prep.structures.interfaces import couple_frame, tie, turning_regions
 from ffr_prep.structures.second_order import frame_second_order
 
@@ -195,6 +195,7 @@ def _record(
         WITHOUT_SHEAR: list(dict.fromkeys(m.section.name for m in frame.members if not m.section.shear)),
         "warnings": [
             *overlap_doubts(frame),
+            *joint_doubts(frame),
             *thickness_doubts(frame),
             *dict.fromkeys(said for one in materials for said in material_doubts(one)),
         ],

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ffr_prep.body.accelerations import gradients
 from ffr_prep.model.coupled import CoupledModel
 from ffr_prep.model.reactions import inertial_loads
 from ffr_prep.reduction.basis import Basis, basis_of
@@ -30,4 +31,11 @@ class InertiaRelief:
     def basis(self, model: CoupledModel, body: FreeBody, L: np.ndarray) -> Basis:
         """The responses as a basis."""
         held = L if len(L) > 6 or not model.names else model.C.toarray()
-        return basis_of(model, L, static_response(model, body, held, inertial_loads(model)))
+        return basis_of(model, L, static_response(model, body, held, central_loads(model)))
+
+
+def central_loads(model: CoupledModel) -> np.ndarray:
+    """(Z, 12) the loads of unit accelerations about the middle of the model. About an origin far away turning and spinning
+    are next to translations, and what tells them apart would be lost in rounding."""
+    loads = inertial_loads(model)
+    return np.hstack([loads[:, :3], loads[:, 3:] - loads[:, :3] @ (gradients() @ model.centre).T])

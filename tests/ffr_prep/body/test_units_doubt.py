@@ -52,6 +52,22 @@ def test_a_sound_body_raises_no_doubt():
     assert fp.units_doubts(thin) == []
 
 
+def test_a_point_far_from_its_place_is_told():
+    """On the surface between its nodes and inside is near enough; beside the body is not, in whole and in parts."""
+    ends = [fp.InterfaceRegion("left"), fp.InterfaceRegion("right")]
+    model = fp.from_mesh(box_mesh("hex8", (0.3, 0.02, 0.02), (6, 1, 1)), STEEL, ends)
+    bar = fp.reduce(model, fp.Request(name="bar", reference=fp.MeanAxis(), reduction=fp.Guyan(), parts=2))
+    for near in ((0.17, 0.02, 0.0), (0.15, 0.01, 0.01)):
+        assert fp.units_doubts(fp.with_point(bar, "p", near)) == []
+    far = fp.with_point(fp.with_point(bar, "p", (0.2, 0.1, 0.0)), "q", (0.2, 0.0, 0.0))
+    assert fp.units_doubts(far) == [
+        "its point 'p' was asked for at (0.2, 0.1, 0) m and is where the surface is nearest, at (0.2, 0.02, 0) m, 0.08 m "
+        "away: is that meant?"
+    ]
+    assert [len(fp.units_doubts(part)) for part in far.parts] == [0, 1]
+    assert fp.units_doubts(fp.with_reference(far, fp.FixedTo("left"))) == fp.units_doubts(far)
+
+
 def test_a_body_of_millimetres_read_in_metres_is_told():
     assert "are its lengths millimetres" in fp.units_doubts(body(size=(300.0, 20.0, 20.0)))[0]
 

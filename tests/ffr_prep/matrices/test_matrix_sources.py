@@ -22,7 +22,7 @@ from ffr_prep.cli import main
 from ffr_prep.cli.matrices import reduce_matrices_command
 from ffr_prep.common.errors import InputError
 from ffr_prep.matrices.model import MatrixModel, row_in_words, with_group
-from ffr_prep.matrices.nastran import GridTable, grids_of_deck, grids_of_op2, model_of_nastran
+from ffr_prep.matrices.nastran import GridTable, grids_of_deck, grids_of_op2, model_of_nastran, rigid_of_deck
 from ffr_prep.matrices.npz import save_matrices
 from ffr_prep.matrices.readers import read_matrices
 from ffr_prep.matrices.unit_systems import UNIT_SYSTEMS
@@ -82,7 +82,15 @@ def test_npz_and_back(model, tmp_path):
     assert list(tmp_path.iterdir()) == [path]
 
 
-@pytest.mark.parametrize("form", ["dense", "csr", "csc", "coo", "triangle"])
+def one_of_each_pair(A: sp.csr_array) -> sp.coo_array:
+    """One triangle of a symmetric matrix whose rows are in another order than that in which it was written."""
+    order = np.random.default_rng(3).permutation(A.shape[0])
+    one = A.tocoo()
+    kept = order[one.row] >= order[one.col]
+    return sp.coo_array((one.data[kept], (one.row[kept], one.col[kept])), shape=A.shape)
+
+
+@pytest.mark.parametrize("form", ["dense", "csr", "csc", "coo", "triangle", "either"])
 def test_npz_by_hand(model, tmp_path, form):
     """What a user writes: dense arrays, or the members that scipy.sparse.save_npz writes, under K/ and M/."""
     arrays = {
@@ -96,7 +104,7 @@ def test_npz_by_hand(model, tmp_path, form):
         if form == "dense":
             arrays[name] = A.toarray()
             continue
-        one = sp.tril(A, format="csr") if form == "triangle" else A.asformat(form)
+        one = {"triangle": sp.tril, "either": one_of_each_pair}.get(form, lambda A: A.asformat(form))(A)
         sp.save_npz(tmp_path / "part.npz", one)
         with np.load(tmp_path / "part.npz") as stored:
             arrays |= {f"{name}/{key}": stored[key] for key in stored.files}
@@ -105,7 +113,7 @@ def test_npz_by_hand(model, tmp_path, form):
     for name in ("K", "M"):
         np.testing.assert_array_equal(getattr(back, name).toarray(), getattr(model, name).toarray())
     assert list(back.groups) == ["a"]
-    assert any("one triangle" in note for note in back.notes) == (form == "triangle")
+    assert any("one triangle" in note for note in back.notes) == (form in ("triangle", "either"))
 
 
 def test_units_of_a_file(model, tmp_path):
@@ -531,6 +539,18 @@ def test_points_of_bulk_data(model):
     assert {name: of.tolist() for name, of in table.groups.items()} == {"set_10": [13, 23]}
 
 
+def test_rigid_elements_of_bulk_data_are_told(model):
+    """Nastran ties their nodes after KGG."""
+    elements = {1: SimpleNamespace(type="RBE2"), 2: SimpleNamespace(type="RBE2"), 3: SimpleNamespace(type="RBE3")}
+    (note,) = rigid_of_deck(SimpleNamespace(rigid_elements=elements, mpcs={7: []}))
+    assert note.startswith(
+        "2 RBE2, 1 RBE3, 1 MPC left out: rigid and averaging connections; make their nodes an interface"
+    )
+    assert rigid_of_deck(SimpleNamespace(rigid_elements={}, mpcs={})) == ()
+    held = {"KGG": SimpleNamespace(data=model.K), "MGG": SimpleNamespace(data=model.M)}
+    assert model_of_nastran(Path("run.op4"), held, grids(model), {}, [note]).notes == (note,)
+
+
 # ---- Nastran: files, where pyNastran is installed -----------------------------------------------------------------
 
 
@@ -759,3 +779,14 @@ def test_the_example_of_the_documentation(tmp_path, monkeypatch):
 def test_the_command_offers_all_units():
     offered = next(option for option in reduce_matrices_command.params if option.name == "units")
     assert tuple(offered.type.choices) == tuple(UNIT_SYSTEMS)
+
+
+def test_a_damping_matrix_that_lets_nothing_vibrate_is_told(model):
+    """Stiffness in its place, as where files are given in another order."""
+    request = fp.Request(name="body", reference=MeanAxis(), reduction=Eigenmodes(2))
+    for C, told in ((1e-8 * model.K, 0), (model.K, 1)):
+        body = fp.reduce(fp.from_matrices(replace(model, C=sp.csr_array(C)), ()), request)
+        said = [w for w in body.provenance["warnings"] if "is their order K, M, C?" in w]
+        assert len(said) == told
+        ratio = body.damping.diagonal() / (2 * np.sqrt(body.omega2))
+        assert all(f"every mode by {ratio.min():.3g} of its critical damping" in w for w in said)

@@ -320,6 +320,23 @@ def test_elements_that_do_not_fit_are_told():
     assert told == first
 
 
+@pytest.mark.parametrize(("kind", "apart"), [("hex8", 0.0), ("tet10", 0.0), ("hex8", 1e-6)])
+def test_parts_that_share_only_some_of_their_nodes_are_told(kind, apart):
+    """Three boxes in an L; the fourth, which fills it, has other elements along one side, or is a little apart there."""
+    low, left = box_mesh(kind, (2, 0.5, 0.5), (4, 1, 1)), box_mesh(kind, (1, 0.5, 0.5), (2, 1, 1))
+    right = box_mesh(kind, (1, 0.5, 0.5), (2 if apart else 3, 1, 1))
+    at_right = right.points + np.array([1.0, 0.5, 0])
+    at_right[:, 1] += apart * (right.points[:, 0] > 0) * (right.points[:, 1] == 0)
+    whole = low
+    for points, block in ((left.points + np.array([0, 0.5, 0]), left.blocks[0]), (at_right, right.blocks[0])):
+        beside = Block(kind, block.nodes + len(whole.points))
+        whole = merged(Mesh(np.concatenate([whole.points, points]), (*whole.blocks, beside), {}, {}, {}))
+    check_mesh(whole)
+    (told,) = misfit_doubts(whole)
+    assert "nodes the mesh is open and too soft, the first at" in told
+    assert "they lie on edges of elements that do not have them" in told
+
+
 # ---- formats ------------------------------------------------------------------------------------------------------
 
 
@@ -652,6 +669,7 @@ def test_abaqus_elements_that_are_no_solids_are_noted(deck):
         ("*Element, type=DASHPOTA\n90, 1, 2\n91, 2, 3\n", "2 DASHPOTA left out: springs and dashpots", "[springs]"),
         ("*Element, type=SpringA\n90, 1, 2\n", "1 SPRINGA left out: springs and dashpots", "scene"),
         ("*Element, type=MASS\n90, 1\n*Element, type=ROTARYI\n91, 1\n", "1 MASS, 1 ROTARYI left out: masses", "scene"),
+        ("*Element, type=AC3D4\n90, 1, 2, 3, 4\n", "1 AC3D4 left out: acoustic elements", "fluid"),
         ("*Coupling, ref node=1\n*Kinematic\n", "1 *COUPLING left out: rigid", "interface"),
         ("*MPC\nBEAM, 1, 2\n*Equation\n2\n1, 1, 1., 2, 1, -1.\n", "1 *MPC, 1 *EQUATION left out: rigid", "interface"),
         ("*Tie, name=t\na, b\n", "1 *TIE left out: connections", "share nodes"),

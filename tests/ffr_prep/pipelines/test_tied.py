@@ -119,6 +119,9 @@ def test_a_tie_between_points_that_differ_is_a_rigid_arm():
     np.testing.assert_allclose(a[3:], end[3:], atol=1e-14)
     np.testing.assert_allclose(a[:3], end[:3] + np.cross(end[3:], (0, 0, 0.2)), atol=1e-14)
     assert model.coupled.names == ("root", "tip")
+    (told,) = model.record["warnings"]
+    assert told.startswith("'first.end' and 'second.a' are tied over 0.2 m, by a rigid arm without mass")
+    assert not half_and_half().record["warnings"]
     np.testing.assert_allclose(
         np.abs(model.coupled.K @ model.coupled.T).max(), 0, atol=1e-9 * abs(model.coupled.K).max()
     )

@@ -133,6 +133,10 @@ CONDITIONS = [
     Case(p(cut, 2, InterfaceRegion("side", "front", "mean")), p(cut, 2, RIGHT)),
     Case(p(fp.Request, name="a", reference="mean", reduction=fp.Guyan()), p(held, fp.MeanAxis())),
     Case(p(reduced, LEFT, drawn_modes=0), p(reduced, LEFT, drawn_modes=1)),
+    Case(
+        p(reduced, "left", InterfaceRegion("right", point=(1e4, 0.0, 0.0))),
+        p(reduced, "left", InterfaceRegion("right", point=(1.0, 0.0, 0.0))),
+    ),
 ]
 
 # ---- reductions ------------------------------------------------------------------------------------------------------

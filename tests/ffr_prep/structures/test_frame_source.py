@@ -165,6 +165,24 @@ def test_shells_that_do_not_fit(members, shells, says):
         read_frame(TRAY, members, shells=shells)
 
 
+def test_a_group_of_a_part_needs_no_shell_or_member_of_its_own(tmp_path):
+    """Groups for interfaces: half of a sheet, and half of the rib along it."""
+    (tmp_path / "sheet.geo").write_text(
+        "Point(1)={0,0,0};Point(2)={1,0,0};Point(3)={2,0,0};Point(4)={2,1,0};Point(5)={1,1,0};Point(6)={0,1,0};\n"
+        "Line(1)={1,2};Line(2)={2,3};Line(3)={3,4};Line(4)={4,5};Line(5)={5,6};Line(6)={6,1};Line(7)={2,5};\n"
+        "Curve Loop(1)={1,7,5,6};Curve Loop(2)={2,3,4,-7};Plane Surface(1)={1};Plane Surface(2)={2};\n"
+        'Physical Surface("sheet")={1,2};Physical Surface("pad")={2};\n'
+        'Physical Curve("rib")={1,2};Physical Curve("end")={2};\n'
+    )
+    frame = read_frame(tmp_path / "sheet.geo", {"rib": RIMS["rims"]}, shells={"sheet": SHELLS["floor"]}, size=0.5)
+    check_frame(frame)
+    for name in ("pad", "end"):
+        assert frame.points[frame.node_groups[name], 0].min() == 1
+    assert len(frame.elements) == len(np.unique(np.sort(frame.elements), axis=0))
+    with pytest.raises(InputError, match="group of surfaces 'sheet' has no shell"):
+        read_frame(tmp_path / "sheet.geo", shells={"pad": SHELLS["floor"]}, size=0.5)
+
+
 def test_curves_alone_hold_no_shells(tmp_path):
     with pytest.raises(ComputationError, match="no surfaces: draw the plates"):
         read_frame(PORTAL, shells=SHELLS)

@@ -36,6 +36,7 @@ from ffr_prep.structures.frame import (
     check_frame,
     group_nodes,
     joined,
+    joint_doubts,
     named,
     overlap_doubts,
     polyline,
@@ -556,7 +557,29 @@ def test_members_that_lie_on_one_another_are_told():
     (plates,) = overlap_doubts(joined(sheet, on))
     assert plates.startswith("4 pairs of plates lie on one another")
     frame = named(joined(line, coarse), a=(0, 0, 0))
-    assert fp.from_frame(frame, [InterfaceRegion("a")]).record["warnings"] == [beams]
+    assert fp.from_frame(frame, [InterfaceRegion("a")]).record["warnings"] == [beams, *joint_doubts(frame)]
+
+
+def test_parts_that_share_only_some_of_their_nodes_are_told():
+    """A spar of other elements than the edge of its sheet, a beam that ends on a sheet, one that ends on a beam."""
+    corners = [(0, 0, 0), (1, 0, 0), (1, 0.3, 0), (0, 0.3, 0)]
+    sheet = fp.panel(corners, fp.Shell(0.003, STEEL), elements=(6, 2))
+    spar, member = {}, Member(circle(0.01), STEEL)
+    for count in (6, 4):
+        spar[count] = polyline(corners[:2], member, elements=count)
+    assert joint_doubts(joined(sheet, spar[6])) == []
+    (told,) = joint_doubts(joined(sheet, spar[4]))
+    assert told.startswith("at 6 nodes nothing joins what looks joined, the first at (0.1667, 0, 0) m")
+    leg = polyline([(1, 0, 0), (1, 0, 0.5), (0.3, 0.1, 0)], member)
+    assert (
+        "at 1 nodes nothing joins what looks joined, the first at (0.3, 0.1, 0) m"
+        in joint_doubts(joined(sheet, leg))[0]
+    )
+    brace = polyline([(0, 0, 0), (0, 1, 0), (0.375, 0, 0)], member)
+    assert "the first at (0.375, 0, 0) m" in joint_doubts(joined(spar[4], brace))[0]
+    beside = replace(spar[4], points=spar[4].points + np.array([0, 0, 1e-6]) * (np.arange(5) > 0)[:, None])
+    assert joint_doubts(joined(spar[4], beside))[0].startswith("at 8 nodes")
+    assert fp.from_frame(joined(sheet, spar[4])).record["warnings"] == [told]
 
 
 def test_sizes_in_millimetres_are_told():
