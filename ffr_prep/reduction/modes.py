@@ -71,7 +71,8 @@ def _expected(omega2: Array, limit: float) -> int:
 def _dense_modes(model: CoupledModel, C: Array, count: int) -> tuple[Array, Array]:
     """In coordinates of unit stiffness: translations and rotations of bodies far smaller than a metre have stiffness and mass
     of other orders, and combinations of both would lose the smaller ones in rounding."""
-    scale = 1 / np.sqrt(model.K.diagonal())
+    stiffness = model.K.diagonal()
+    scale = 1 / np.sqrt(np.where(stiffness > 0, stiffness, stiffness.max()))
     conditions = C * scale
     null = scipy.linalg.null_space(conditions / np.linalg.norm(conditions, axis=1, keepdims=True))
     K, M = (null.T @ (scale[:, None] * A.toarray() * scale) @ null for A in (model.K, model.M))
