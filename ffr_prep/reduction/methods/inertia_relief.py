@@ -9,11 +9,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ffr_prep.common.arrays import Array
 from ffr_prep.model.coupled import CoupledModel
 from ffr_prep.model.reactions import inertial_loads
 from ffr_prep.reduction.basis import Basis, basis_of
 from ffr_prep.reduction.responses import static_response
 from ffr_prep.solvers.factor import FreeBody
+
+_ROUNDING = 1e-13  # of the largest load of a turn; that of a thread a millionth as thick as long is 1e-12
 
 
 @dataclass(frozen=True)
@@ -30,4 +33,12 @@ class InertiaRelief:
     def basis(self, model: CoupledModel, body: FreeBody, L: np.ndarray) -> Basis:
         """The responses as a basis."""
         held = L if len(L) > 6 or not model.names else model.C.toarray()
-        return basis_of(model, L, static_response(model, body, held, inertial_loads(model)))
+        return basis_of(model, L, static_response(model, body, held, _loads(model)))
+
+
+def _loads(model: CoupledModel) -> Array:
+    """(Z, 12) the loads of unit accelerations, those zero that are none but for rounding, as a straight beam's under spin
+    about itself: their responses would be shapes without a meaning, and no symmetry of the body."""
+    loads = inertial_loads(model)
+    sizes = np.abs(loads).max(axis=0, initial=0.0)
+    return loads * (sizes > _ROUNDING * sizes[3:].max())
