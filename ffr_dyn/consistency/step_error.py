@@ -52,7 +52,8 @@ from ffr_prep.common.units import natural
 
 VIBRATION = 4.5  # v over s beyond which a difference is vibration that the step does not resolve
 LITTLE = 1e-3  # of the largest range of its kind: an output that moves by less counts as if it moved by this
-ARM = 1e-6  # of the largest range of forces times that of positions, the same for moments
+ARM = 1e-6  # of the largest range of forces times that of positions, the same for moments. Forces count from LITTLE of
+# moments over the size of the scene: no arm is longer, so a force is less only where moments are carried without forces
 IN_PART = 1.5  # of what a twin with the same step is off
 MIDDLE, FLOOR, WINDOW = 3.0, 2.2, 16  # of amplitudes beside a twin with half the step
 TWIN = 2  # order of twins
@@ -363,10 +364,13 @@ def least_ranges(run: Result) -> dict[str, float]:
     largest: dict[str, float] = {}
     for name, span in spans.items():
         largest[_kind(name)] = max(span, largest.get(_kind(name), 0.0))
-    arm = ARM * largest.get("force", 0.0) * largest.get("position", 0.0)
+    turning = max(largest.get("moment", 0.0), largest.get("torque", 0.0))
+    beside = {
+        "moment": ARM * largest.get("force", 0.0) * largest.get("position", 0.0),
+        "force": LITTLE * turning / (sizes["position"] or np.inf),
+    }
     floors = {
-        kind: max(LITTLE * most, CONSTANT * sizes[kind], arm if kind == "moment" else 0.0)
-        for kind, most in largest.items()
+        kind: max(LITTLE * most, CONSTANT * sizes[kind], beside.get(kind, 0.0)) for kind, most in largest.items()
     }
     for kind, floor in _floors_at_rest(run, sizes).items():
         floors[kind] = max(floors.get(kind, 0.0), floor)

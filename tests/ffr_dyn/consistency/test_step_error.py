@@ -112,6 +112,14 @@ def test_outputs_that_hardly_move_are_measured_by_their_kind():
     assert scales["c.q"] == pytest.approx(1e-5)
 
 
+def test_forces_beside_torques_are_measured_by_the_torque_over_the_size():
+    """A shaft under torque pulls at its ends by next to nothing, which no step is to resolve."""
+    shaft = result(a_position=2.0 * TIME, a_moment=100.0 * TIME, a_force=1e-6 * TIME)
+    assert ranges(shaft)["a.force"] == pytest.approx(1e-3 * 100.0 / 2.0)
+    geared = result(a_position=2.0 * TIME, a_moment=100.0 * TIME, a_force=50.0 * TIME)
+    assert ranges(geared)["a.force"] == pytest.approx(50.0)
+
+
 @pytest.mark.parametrize(
     ("kind", "velocity"), [("spherical", (1.0, 2.0, 0.5)), ("cylindrical", (0, 0, 2.0)), ("revolute", (0, 0, 0.3))]
 )
