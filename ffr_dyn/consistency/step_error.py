@@ -78,6 +78,7 @@ SEED, GROWN = 1e-2, 1e2  # of rounding, from which an output has grown: it begin
 NEVER = (
     1e-25  # of rounding, below which nothing begins of itself: a force that is written begins there, as exp(-1e4 t**2)
 )
+STILL = 1e-3  # of a seed, below which an output trembles, and does not grow, while nothing moves yet
 FIRST_ROWS = 2  # in which what a twin shows may be larger than ever after
 BEYOND = 0.25  # of a row, up to where steps are looked at after the first
 SLIGHT = 1e-6  # of the size of a scene: points that move by no more are deflected, they do not travel
@@ -486,7 +487,8 @@ def from_rounding(run: Result) -> dict[str, float]:
             grown = np.abs(moved).max(axis=1, initial=0.0)
             if _grows_evenly(np.maximum.accumulate(grown), SEED * rounding[name], GROWN * rounding[name]):
                 found[name] = float(grown.max())
-    return found
+    moves = [any(map(PLACES.search, names)) for names in (found, run.quantities)]  # forces alone set in, as of a stop
+    return {} if moves == [False, True] else found
 
 
 def _grows_evenly(size: Array, seed: float, motion: float) -> bool:
@@ -494,7 +496,7 @@ def _grows_evenly(size: Array, seed: float, motion: float) -> bool:
     nonzero = size[size > 0]
     if nonzero.size == 0 or not NEVER * seed <= nonzero[0] <= seed or nonzero[-1] < motion:
         return False
-    log = np.log(nonzero)  # the quotient of the largest and the least may be too large for a number
+    log = np.log(np.maximum(nonzero, STILL * seed))  # the quotient of two of them may be too large for a number
     decades = (log - log[0]) / (np.log(FULL) + log[-1] - log[0])
     middle, last = (np.count_nonzero((decades > third) & (decades <= third + 1 / 3)) for third in (1 / 3, 2 / 3))
     return bool(min(middle, last) >= FEW and last <= FEW * (middle + 1))

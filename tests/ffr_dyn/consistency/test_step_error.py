@@ -250,6 +250,15 @@ def test_breaks_that_nobody_tells_are_those_of_python_functions_and_of_sharp_for
     assert found(formula("sqrt((t - 0.3) ** 2) + min(t, 0.6) ** 2"))[A_FORMULA] == pytest.approx([0.3], abs=1e-6)
 
 
+def test_what_trembles_before_it_is_driven_does_not_grow_by_itself():
+    """Rounding of a scene that rests until a cam lifts it, and of a stop that it then leaves."""
+    rests = TIME < 0.5 * TIME[-1]
+    tremble = np.where(TIME > 0, 1e-34 + 1e-16 * TIME, 0.0)
+    lift = np.where(rests, tremble, (TIME - 0.5 * TIME[-1]) ** 3)
+    force = np.where(rests, tremble, 10.0 ** np.minimum(2.0, -8 + 400 * (TIME - 0.5 * TIME[-1])))
+    assert from_rounding(result(a_position=lift, b_position=TIME, s_force=force)) == {}
+
+
 def test_exponential_growth_from_rounding_is_no_motion_that_sets_in():
     begun = np.maximum(TIME - 0.2, 0.0)
     grown = 1e-16 * np.cosh(np.clip(40 * TIME, 0.0, 35.0))
