@@ -65,6 +65,9 @@ class QuasiStatic:
 class Inverse(OverTime):
     """Method, step, stabilisation and how it begins are of dynamic elastic coordinates.
 
+    begin : "quasi-static": with the deflections that the motion asks for, which do not ring; "steady" or "periodic": in that
+        motion; "as-given": with those of the scene
+
     >>> analysis = fd.Inverse("quasi-static")
     >>> result = fd.run(scene, fd.Settings(start=0, end=1, output_step=0.01, method=fd.Within(), analysis=analysis))
     """

@@ -370,9 +370,7 @@ def least_ranges(run: Result) -> dict[str, float]:
         "moment": ARM * largest.get("force", 0.0) * largest.get("position", 0.0),
         "force": LITTLE * turning / (sizes["position"] or np.inf),
     }
-    floors = {
-        kind: max(LITTLE * most, CONSTANT * sizes[kind], beside.get(kind, 0.0)) for kind, most in largest.items()
-    }
+    floors = {kind: max(LITTLE * most, CONSTANT * sizes[kind], beside.get(kind, 0.0)) for kind, most in largest.items()}
     for kind, floor in _floors_at_rest(run, sizes).items():
         floors[kind] = max(floors.get(kind, 0.0), floor)
     rounding = _rounding(run, sizes)

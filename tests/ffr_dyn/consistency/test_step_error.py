@@ -252,7 +252,7 @@ def test_breaks_that_nobody_tells_are_those_of_python_functions_and_of_sharp_for
 
 def test_what_trembles_before_it_is_driven_does_not_grow_by_itself():
     """Rounding of a scene that rests until a cam lifts it, and of a stop that it then leaves."""
-    rests = TIME < 0.5 * TIME[-1]
+    rests = 0.5 * TIME[-1] > TIME
     tremble = np.where(TIME > 0, 1e-34 + 1e-16 * TIME, 0.0)
     lift = np.where(rests, tremble, (TIME - 0.5 * TIME[-1]) ** 3)
     force = np.where(rests, tremble, 10.0 ** np.minimum(2.0, -8 + 400 * (TIME - 0.5 * TIME[-1])))

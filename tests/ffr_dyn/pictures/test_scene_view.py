@@ -71,7 +71,9 @@ def hung(gravity):
 
 
 def test_a_rope_is_drawn_from_end_to_end():
-    assert {trace["name"] for trace in Content(fd.show(hung((0, 0, -9.81))).text).about["traces"]} == {"rope (distance)"}
+    assert {trace["name"] for trace in Content(fd.show(hung((0, 0, -9.81))).text).about["traces"]} == {
+        "rope (distance)"
+    }
 
 
 @pytest.mark.parametrize(("gravity", "up"), [((0, 0, -9.81), 2), ((0, -9.81, 0), 1), ((9.81, 0, 0), 0)])
