@@ -29,11 +29,12 @@ SHARED = "ffr_prep.common"
 FLOORS = {
     "ffr_prep": (
         "common", "body", "solvers", "mesh", "model", "reduction", "solids", "structures", "matrices", "interchange",
-        "report", "pipelines", "cli",
+        "report", "pipelines", "cli", "__main__",
     ),
     "ffr_dyn": (
         "functions", "scene", "variants", "equations", "kernels", "integrators", "compile", "closing", "results",
         "consistency", "linear", "pictures", "analyses", "realtime", "scene_file", "chart", "economy", "studies", "cli",
+        "__main__",
     ),
 }  # fmt: skip
 MOST_FLAT, MOST_IN_A_FOLDER = 12, 20
