@@ -18,6 +18,7 @@ from ffr_dyn.analyses.kinematic import Followed, along_the_path
 from ffr_dyn.analyses.outcome import efforts, efforts_told, needed, only, result_of, with_quantities
 from ffr_dyn.analyses.registry import OverTime, option
 from ffr_dyn.analyses.settings import Settings
+from ffr_dyn.analyses.trials.begin import Beginning
 from ffr_dyn.consistency.assemble import Assembled, assemble, flattened
 from ffr_dyn.consistency.doubts import checked
 from ffr_dyn.consistency.evaluation import Evaluator, copied, evaluate, evaluator, joined, locked
@@ -42,13 +43,14 @@ DIFFERENCE = 1e-6
 
 @dataclass(frozen=True)
 class Dynamic:
-    """Elastic coordinates are integrated; `method` is that of `forward`.
+    """Elastic coordinates are integrated; `method`, `stabilisation` and `begin` are those of `forward`.
 
     >>> result = fd.inverse(scene, end=0.2, output_step=1e-3, elastic=fd.Dynamic(fd.ROS2(1e-4)))
     """
 
     method: Integrator | Within | None = None
     stabilisation: Stabilisation = Projection()  # noqa: RUF009 - frozen
+    begin: Beginning = "as-given"
 
 
 @dataclass(frozen=True)
@@ -61,7 +63,10 @@ class QuasiStatic:
 
 @dataclass(frozen=True)
 class Inverse(OverTime):
-    """Method, step and stabilisation are of dynamic elastic coordinates.
+    """Method, step, stabilisation and how it begins are of dynamic elastic coordinates.
+
+    begin : "quasi-static": with the deflections that the motion asks for, which do not ring; "steady" or "periodic": in that
+        motion; "as-given": with those of the scene
 
     >>> analysis = fd.Inverse("quasi-static")
     >>> result = fd.run(scene, fd.Settings(start=0, end=1, output_step=0.01, method=fd.Within(), analysis=analysis))
@@ -73,10 +78,11 @@ class Inverse(OverTime):
         default="dynamic",
         metadata=option("--quasi-static/--dynamic", "Bodies deform without vibration. | Bodies vibrate (default)."),
     )
+    begin: Beginning = "as-given"
 
     def perform(self, scene: Scene, settings: Settings, **how: Any) -> Result:
         quasi_static = self.elastic == "quasi-static"
-        elastic = QuasiStatic() if quasi_static else Dynamic(settings.method, settings.stabilisation)
+        elastic = QuasiStatic() if quasi_static else Dynamic(settings.method, settings.stabilisation, self.begin)
         return inverse(scene, elastic=elastic, **settings.span, **how)
 
 
@@ -108,7 +114,8 @@ def inverse(
         return _quasi_static(scene, (start, end, output_step), outputs, path, progress)
     result = forward(
         scene, end=end, output_step=output_step, method=elastic.method, start=start,
-        stabilisation=elastic.stabilisation, outputs=needed(scene, outputs), path=path, progress=progress,
+        stabilisation=elastic.stabilisation, begin=elastic.begin, outputs=needed(scene, outputs), path=path,
+        progress=progress,
     )  # fmt: skip
     told = efforts_told(scene, result, {})
     named = replace(result, attributes={**told, "analysis": "inverse dynamics"})

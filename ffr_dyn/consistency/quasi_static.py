@@ -48,6 +48,10 @@ WEIGHTS = (
     np.array([[-25, 48, -36, 16, -3], [35, -104, 114, -56, 11], [-30, 108, -144, 84, -18], [12, -48, 72, -48, 12]]) / 12
 )
 DIFFERENCE = 1e-6  # of deflections, relative
+_OTHERS = (
+    'begin = "steady" starts a scene that rests in its equilibrium, and one whose drivers turn evenly in its steady '
+    'motion, "periodic" in a turn that repeats itself'
+)
 
 
 @dataclass(frozen=True)
@@ -104,8 +108,7 @@ def quasi_static(assembled: Assembled, time: float) -> Assembled:
     if not slow:
         notes.append(
             f"the motion at the start is not slow beside the lowest vibration, {of.omega[0] / 2 / np.pi:.4g} Hz: "
-            "there are no deflections that follow it without vibration, and those of the start do so roughly"
-            + _evenly(of)
+            f"there are no deflections that follow it without vibration, and those of the start do so roughly; {_OTHERS}"
         )
     return replace(assembled, x=x, v=v, notes=tuple(notes))
 
@@ -130,14 +133,8 @@ def _failed(time: float, of: Vibrations) -> ComputationError:
     return ComputationError(
         f"at t = {time:.6g} s no quasi-static deflections were found: the load bends a body too far, or is near to "
         f"buckling it, or forces jump, or the motion is as fast as the lowest vibration, {of.omega[0] / 2 / np.pi:.4g} Hz; "
-        f'begin "as-given"{_evenly(of)}'
+        f'{_OTHERS}, and begin = "as-given" undeformed'
     )
-
-
-def _evenly(of: Vibrations) -> str:
-    """What else there is for machines that are driven."""
-    driven = of.assembled.system.scene.drivers
-    return ', or, where drivers turn evenly, with begin = "steady" or "periodic"' if driven else ""
 
 
 def _inertial(assembled: Assembled, of: Vibrations) -> float:

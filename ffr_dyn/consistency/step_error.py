@@ -52,7 +52,8 @@ from ffr_prep.common.units import natural
 
 VIBRATION = 4.5  # v over s beyond which a difference is vibration that the step does not resolve
 LITTLE = 1e-3  # of the largest range of its kind: an output that moves by less counts as if it moved by this
-ARM = 1e-6  # of the largest range of forces times that of positions, the same for moments
+ARM = 1e-6  # of the largest range of forces times that of positions, the same for moments. Forces count from LITTLE of
+# moments over the size of the scene: no arm is longer, so a force is less only where moments are carried without forces
 IN_PART = 1.5  # of what a twin with the same step is off
 MIDDLE, FLOOR, WINDOW = 3.0, 2.2, 16  # of amplitudes beside a twin with half the step
 TWIN = 2  # order of twins
@@ -77,6 +78,7 @@ SEED, GROWN = 1e-2, 1e2  # of rounding, from which an output has grown: it begin
 NEVER = (
     1e-25  # of rounding, below which nothing begins of itself: a force that is written begins there, as exp(-1e4 t**2)
 )
+STILL = 1e-3  # of a seed, below which an output trembles, and does not grow, while nothing moves yet
 FIRST_ROWS = 2  # in which what a twin shows may be larger than ever after
 BEYOND = 0.25  # of a row, up to where steps are looked at after the first
 SLIGHT = 1e-6  # of the size of a scene: points that move by no more are deflected, they do not travel
@@ -363,11 +365,12 @@ def least_ranges(run: Result) -> dict[str, float]:
     largest: dict[str, float] = {}
     for name, span in spans.items():
         largest[_kind(name)] = max(span, largest.get(_kind(name), 0.0))
-    arm = ARM * largest.get("force", 0.0) * largest.get("position", 0.0)
-    floors = {
-        kind: max(LITTLE * most, CONSTANT * sizes[kind], arm if kind == "moment" else 0.0)
-        for kind, most in largest.items()
+    turning = max(largest.get("moment", 0.0), largest.get("torque", 0.0))
+    beside = {
+        "moment": ARM * largest.get("force", 0.0) * largest.get("position", 0.0),
+        "force": LITTLE * turning / (sizes["position"] or np.inf),
     }
+    floors = {kind: max(LITTLE * most, CONSTANT * sizes[kind], beside.get(kind, 0.0)) for kind, most in largest.items()}
     for kind, floor in _floors_at_rest(run, sizes).items():
         floors[kind] = max(floors.get(kind, 0.0), floor)
     rounding = _rounding(run, sizes)
@@ -482,7 +485,8 @@ def from_rounding(run: Result) -> dict[str, float]:
             grown = np.abs(moved).max(axis=1, initial=0.0)
             if _grows_evenly(np.maximum.accumulate(grown), SEED * rounding[name], GROWN * rounding[name]):
                 found[name] = float(grown.max())
-    return found
+    moves = [any(map(PLACES.search, names)) for names in (found, run.quantities)]  # forces alone set in, as of a stop
+    return {} if moves == [False, True] else found
 
 
 def _grows_evenly(size: Array, seed: float, motion: float) -> bool:
@@ -490,7 +494,7 @@ def _grows_evenly(size: Array, seed: float, motion: float) -> bool:
     nonzero = size[size > 0]
     if nonzero.size == 0 or not NEVER * seed <= nonzero[0] <= seed or nonzero[-1] < motion:
         return False
-    log = np.log(nonzero)  # the quotient of the largest and the least may be too large for a number
+    log = np.log(np.maximum(nonzero, STILL * seed))  # the quotient of two of them may be too large for a number
     decades = (log - log[0]) / (np.log(FULL) + log[-1] - log[0])
     middle, last = (np.count_nonzero((decades > third) & (decades <= third + 1 / 3)) for third in (1 / 3, 2 / 3))
     return bool(min(middle, last) >= FEW and last <= FEW * (middle + 1))

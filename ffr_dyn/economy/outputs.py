@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
-from difflib import get_close_matches
 from typing import Any
 
 import numpy as np
@@ -13,7 +12,7 @@ from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.consistency.assemble import Assembled
 from ffr_dyn.economy.policy import DEFAULT, Policy
 from ffr_dyn.functions.formula import names_in
-from ffr_dyn.results.quantities import catalogue
+from ffr_dyn.results.quantities import catalogue, like
 from ffr_dyn.results.result import Result
 from ffr_dyn.results.stress import tensors
 from ffr_dyn.scene.force_kinds import forces_of
@@ -116,8 +115,7 @@ def _found(everything: Mapping[str, Any], scene: Scene, name: str) -> tuple[str,
     labels: list[tuple[str, ...]] = [axis.labels for axis in everything[head].axes[:1]] if head in everything else []
     if labels and label in labels[0]:
         return head, (labels[0].index(label),), everything[head].unit
-    close = get_close_matches(name, [*everything, *(f"{body.name}.{STRESS}" for body in scene.bodies)], 3, 0.5)
-    hint = f"did you mean {', '.join(close)}?" if close else f"there are: {', '.join(everything)}"
+    hint = like(name, [*everything, *(f"{body.name}.{STRESS}" for body in scene.bodies)], 0.5)
     raise InputError(f"output {name!r} is none of the scene's quantities or their components; {hint}")
 
 

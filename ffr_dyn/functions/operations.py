@@ -11,10 +11,10 @@ from collections.abc import Callable
 Triple = tuple[float, float, float]
 
 ADD, SUBTRACT, MULTIPLY, DIVIDE, MIN, MAX = 0, 1, 2, 3, 4, 5
-POWER, SIN, COS, EXP, LOG, SQRT, TANH, ATAN, ASIN, ACOS, ABS, SIGN, STEP, SMOOTH = range(6, 20)
+POWER, SIN, COS, EXP, LOG, SQRT, TANH, ATAN, ASIN, ACOS, ABS, SIGN, STEP, SMOOTH, RAMP = range(6, 21)
 
 # What formulas call by name. step(u): 0 before u = 0, 1 from there; smooth(u): rises from 0 to 1 between u = 0 and 1 with
-# two continuous derivatives.
+# two continuous derivatives; ramp(u): its integral, an angle whose speed does not overshoot.
 FUNCTIONS = {
     "sin": SIN,
     "cos": COS,
@@ -29,6 +29,7 @@ FUNCTIONS = {
     "sign": SIGN,
     "step": STEP,
     "smooth": SMOOTH,
+    "ramp": RAMP,
     "min": MIN,
     "max": MAX,
 }
@@ -53,6 +54,11 @@ def _derivatives_of_smooth(u: float) -> tuple[float, float]:
     return 30 * x**2 * (1 - x) ** 2, 60 * x * (1 - x) * (1 - 2 * x)
 
 
+def _ramp(u: float) -> float:
+    x = min(max(u, 0.0), 1.0)
+    return 2.5 * x**4 - 3 * x**5 + x**6 + max(u - 1.0, 0.0)
+
+
 _VALUE: dict[int, Callable[[float], float]] = {
     SIN: math.sin,
     COS: math.cos,
@@ -67,6 +73,7 @@ _VALUE: dict[int, Callable[[float], float]] = {
     SIGN: lambda u: float((u > 0) - (u < 0)),
     STEP: lambda u: float(u >= 0),
     SMOOTH: _smooth,
+    RAMP: _ramp,
 }
 
 # f', f'' of the functions of one variable.
@@ -84,6 +91,7 @@ _DERIVATIVES: dict[int, Callable[[float], tuple[float, float]]] = {
     SIGN: lambda u: (0.0, 0.0),
     STEP: lambda u: (0.0, 0.0),
     SMOOTH: _derivatives_of_smooth,
+    RAMP: lambda u: (_smooth(u), _derivatives_of_smooth(u)[0]),
 }
 
 

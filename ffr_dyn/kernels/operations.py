@@ -13,7 +13,7 @@ from ffr_dyn.kernels.vectors import get
 
 # as in ffr_dyn.functions.operations
 ADD, SUBTRACT, MULTIPLY, DIVIDE, MIN, MAX = 0, 1, 2, 3, 4, 5
-POWER, SIN, COS, EXP, LOG, SQRT, TANH, ATAN, ASIN, ACOS, ABS, SIGN, STEP = range(6, 19)
+POWER, SIN, COS, EXP, LOG, SQRT, TANH, ATAN, ASIN, ACOS, ABS, SIGN, STEP, SMOOTH = range(6, 20)
 
 
 @kernel
@@ -33,6 +33,14 @@ def smooth(u):
         30.0 * x * x * (1.0 - x) ** 2,
         60.0 * x * (1.0 - x) * (1.0 - 2.0 * x),
     )
+
+
+@kernel
+def ramp(u):
+    """The integral of `smooth`, and two derivatives."""
+    x = min(max(u, 0.0), 1.0)
+    rate, second, _ = smooth(u)
+    return x**4 * (2.5 + x * (x - 3.0)) + max(u - 1.0, 0.0), rate, second
 
 
 @kernel
@@ -68,7 +76,9 @@ def of_one(op, parameter, u):
         return (0.0 if u == 0.0 else math.copysign(1.0, u)), 0.0, 0.0
     if op == STEP:
         return (1.0 if u >= 0.0 else 0.0), 0.0, 0.0
-    return smooth(u)
+    if op == SMOOTH:
+        return smooth(u)
+    return ramp(u)
 
 
 @kernel

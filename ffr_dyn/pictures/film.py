@@ -39,6 +39,9 @@ _SEQUENTIAL, _STRESS, _DIVERGING = "viridis", "turbo", "coolwarm"
 _AUTOMATIC_SHARE = 0.05
 _PLANAR_TOLERANCE = 1e-6
 _TITLE_WIDTH = 13
+# From where a plane is seen, by its normal, and the level part of what a corner is seen along, by the axis that is up.
+_FRONTS = {"z": np.array([0.0, 0.0, 1.0]), "y": np.array([0.0, -1.0, 0.0]), "x": np.array([1.0, 0.0, 0.0])}
+_CORNERS = (np.array([0.0, -1.0, 0.75]), np.array([0.75, 0.0, 1.0]), np.array([0.75, -1.0, 0.0]))
 _BATCH = 400_000  # points times moments
 
 
@@ -129,6 +132,8 @@ class Film:
     forces, moments : arrows in each picture, from and to (F, N, 2, 3) [m]
     heading    : words in the corner of the picture, instead of time and scale
     low, high  : (3,) corners of a box that holds the whole motion [m]
+    gravity    : (3,) [m/s^2] of the scene, zero where it is not known
+    plane      : normal of the plane of the scene, "x", "y", "z" or "none"; nothing where only the motion tells
     """
 
     times: Array
@@ -144,6 +149,8 @@ class Film:
     heading: str = ""
     forces: Array = field(default_factory=lambda: np.zeros((0, 0, 2, 3)))
     moments: Array = field(default_factory=lambda: np.zeros((0, 0, 2, 3)))
+    gravity: Array = field(default_factory=lambda: np.zeros(3))
+    plane: str = ""
 
     @property
     def size(self) -> float:
@@ -257,7 +264,8 @@ def film_at(
     low, high = _box(solids, links, paths, [factor * deflection for deflection in deflections])
     deflection = max(deflections, default=0.0)
     shades = colouring(solids, len(times), colour, deflection, limit)
-    return Film(times, solids, links, paths, factor, deflection, low, high, shades)
+    weight = np.asarray(result.attributes.get("gravity", np.zeros(3)), float)
+    return Film(times, solids, links, paths, factor, deflection, low, high, shades, gravity=weight)
 
 
 def _require_rows(result: Result) -> None:
@@ -370,17 +378,27 @@ def _in_batches(solid: Solid, q: Array) -> list[Array]:
 
 
 def camera_for(shown: Film) -> Camera:
-    """Planar motion is seen nearly from its front, slightly from above and the right (x to the right in the planes xy
-    and xz, y or z up); spatial motion from a corner, z up."""
-    front = {
-        "z": Camera((0.20, 0.28, 1.0), (0.0, 1.0, 0.0)),
-        "y": Camera((0.20, -1.0, 0.28), (0.0, 0.0, 1.0)),
-        "x": Camera((1.0, 0.20, 0.28), (0.0, 0.0, 1.0)),
-    }
-    for axis, camera in front.items():
-        if _is_planar(shown, "xyz".index(axis)):
-            return camera
-    return Camera((0.75, -1.0, 0.6), (0.0, 0.0, 1.0))
+    """Planar motion is seen nearly from its front, slightly from above and the right; spatial motion from a corner.
+
+    Up is against gravity; without gravity in the picture y is up in the plane xy (x to the right), and z elsewhere.
+    """
+    for axis, front in _FRONTS.items():
+        if shown.plane == axis or (not shown.plane and _is_planar(shown, "xyz".index(axis))):
+            up = _upwards(shown.gravity * (np.eye(3)["xyz".index(axis)] == 0), "y" if axis == "z" else "z")
+            return _camera(front + 0.20 * np.cross(up, front) + 0.28 * up, up)
+    up = _upwards(shown.gravity, "z")
+    return _camera(_CORNERS[int(np.argmax(np.abs(up)))] + 0.6 * up, up)
+
+
+def _upwards(gravity: Array, default: str) -> Array:
+    """(3,) the axis against gravity (3,)."""
+    along = int(np.argmax(np.abs(gravity)))
+    found: Array = -np.sign(gravity[along]) * np.eye(3)[along] if gravity.any() else np.eye(3)["xyz".index(default)]
+    return found
+
+
+def _camera(direction: Array, up: Array) -> Camera:
+    return Camera((direction[0], direction[1], direction[2]), (up[0], up[1], up[2]))
 
 
 # ---- from the result to the times of the pictures -----------------------------------------------------------------

@@ -44,12 +44,14 @@ class SceneView:
     beside  : joints, forces, markers
     apart   : by words, the ends (2, 3) [m] of lines between points that a joint ties and that are apart as declared
     trouble : why the scene cannot be assembled, or nothing
+    plane   : the normal of the plane that it is computed in, or "none"
     """
 
     shown: Result
     beside: Connections
     apart: dict[str, Array]
     trouble: str = ""
+    plane: str = "none"
 
     @property
     def faint(self) -> frozenset[str]:
@@ -134,10 +136,10 @@ def scene_view(scene: Scene, time: float = 0.0) -> SceneView:
     surfaces = {body.name: surface_of(body) for body in assembled.system.scene.bodies}
     geometry = {name: surface for name, surface in surfaces.items() if surface is not None}
     shown = Result(np.array([time]), quantities, geometry, described(scene))
-    beside = _all_connections(scene, shown)
+    beside, plane = _all_connections(scene, shown), assembled.system.scene.plane
     if _far(declared, shown) < _MOVED:
-        return SceneView(shown, beside, {})
-    return SceneView(_with_declared(shown, declared), beside, _apart(scene, declared))
+        return SceneView(shown, beside, {}, plane=plane)
+    return SceneView(_with_declared(shown, declared), beside, _apart(scene, declared), plane=plane)
 
 
 # ---- as declared -----------------------------------------------------------------------------------------------------
@@ -228,9 +230,10 @@ def _ties_points(joint: Joint) -> bool:
 
 
 def _lines(scene_result: Result, places: Any) -> Iterator[tuple[str, Array]]:
-    """Of forces between two points, the line."""
+    """Of forces between two points, and of joints that keep their distance, the line."""
     for name, of in scene_result.attributes.get("connections", {}).items():
-        if "axis" not in of and len(of["at"]) == 2 and all(end in places for end in of["at"]):
+        between = "axis" not in of or of["kind"] == "distance"
+        if between and len(of["at"]) == 2 and all(end in places for end in of["at"]):
             yield f"{name} ({of['kind']})", np.concatenate([places[end] for end in of["at"]])
 
 
@@ -241,7 +244,7 @@ def _film(seen: SceneView) -> Film:
     film = film_at(seen.shown, seen.shown.time, colour="body")
     lines = {**seen.apart, **dict(_lines(seen.shown, seen.beside.markers))}
     points = np.concatenate([film.corners, *seen.beside.markers.values()])
-    film = replace(film, traces=lines, low=points.min(axis=0), high=points.max(axis=0))
+    film = replace(film, traces=lines, low=points.min(axis=0), high=points.max(axis=0), plane=seen.plane)
     ends = [of for _, arrows in _ends(seen, film.size) for of in arrows]
     points = np.concatenate([points, *ends])
     return replace(film, low=points.min(axis=0), high=points.max(axis=0))

@@ -120,11 +120,23 @@ def _selected(everything: Mapping[str, Entry], outputs: Sequence[str]) -> dict[s
         patterns = DEFAULT_OUTPUTS if pattern == "default" else (pattern,)
         fitting = {pattern} if pattern in everything else _fitting(patterns, everything)
         if not fitting:
-            close = get_close_matches(pattern, everything, 3)
-            known = f"did you mean {', '.join(close)}?" if close else f"there are: {', '.join(everything)}"
-            raise InputError(f"outputs: {pattern!r} is none of the scene's quantities; {known}")
+            raise InputError(
+                f"outputs: {pattern!r} is none of the scene's quantities; {like(pattern, everything, 0.6)}"
+            )
         wanted |= fitting
     return {name: entry for name, entry in everything.items() if name in wanted}
+
+
+def like(name: str, everything: Sequence[str] | Mapping[str, Entry], near: float) -> str:
+    """What to write instead of a name that is none of the scene's, in words: names like it, or of the same body, joint or
+    force, or what there is at all."""
+    if close := get_close_matches(name, everything, 3, near):
+        return f"did you mean {', '.join(close)}?"
+    head = name.partition(".")[0]
+    if siblings := [one for one in everything if one.startswith(f"{head}.")]:
+        return f"of {head!r} there are: {', '.join(siblings)}"
+    heads = ", ".join(f"{one}.*" for one in dict.fromkeys(one.partition(".")[0] for one in everything))
+    return f"there are: {heads}; `ffr-dyn info` lists those of a result"
 
 
 def _fitting(patterns: Sequence[str], names: Iterable[str]) -> set[str]:

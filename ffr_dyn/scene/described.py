@@ -25,8 +25,8 @@ def described(scene: Scene) -> dict[str, Any]:
     """Plain JSON values: the title; the `mass` [kg] of all bodies and a `length` [m], the largest radius of gyration about
     the origin of a body's frame, which tell what is small; the parts of bodies by the name of the whole; places (3,) of the
     ground's points [m]; by the name of a joint, driver, coupling or force the markers `at` which it is, and what of it is
-    drawn; and of bodies with stress what it lacks, in words, and, where the base rests, `gravity` and what their shapes
-    leave out (`ffr_prep.body.left_out_stress`).
+    drawn; `gravity` [m/s^2]; and of bodies with stress what it lacks, in words, and, where the base rests, what their
+    shapes leave out (`ffr_prep.body.left_out_stress`).
     """
     parts = {name: [part.name for part in of] for name, of in wholes(scene.bodies).items()}
     ground = {name: at.tolist() for name, at in scene.ground.items()}
@@ -34,9 +34,9 @@ def described(scene: Scene) -> dict[str, Any]:
     stress = {body.name: of for body in scene.bodies if (of := left_out_stress(body.model.provenance))}
     lacks = {body.name: said for body in scene.bodies if (said := shear_doubt(body.model.provenance))}
     found: dict[str, Any] = {**sizes, "parts": parts, "ground": ground, "connections": _connections(scene)}
-    found |= {"stress_lacks": lacks}
+    found |= {"stress_lacks": lacks, "gravity": scene.gravity.tolist() if scene.gravity.any() else []}
     if stress and all(is_zero(f) for f in scene.base_acceleration):  # which a result does not keep
-        found |= {"gravity": [float(g) for g in scene.gravity], "left_out_stress": stress}
+        found |= {"left_out_stress": stress}
     return {"title": scene.name} | {key: value for key, value in found.items() if value}
 
 

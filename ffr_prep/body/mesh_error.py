@@ -23,5 +23,6 @@ def mesh_doubt(provenance: Mapping[str, Any]) -> str | None:
     percent = f"{100 * first:.{0 if first >= 0.1 else 1}f}"
     return (
         f"its mesh is too coarse: the lowest frequency is about {percent} % too high; reduce it with smaller "
-        "elements or with those of second order (`ffr-prep reduce --size`, `--order 2`)"
+        "elements or with those of second order (`ffr-prep reduce --size`, `--order 2`; a file that is a mesh already is "
+        "made finer by the program that wrote it)"
     )

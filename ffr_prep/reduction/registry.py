@@ -130,8 +130,20 @@ def reduction_of(requests: Sequence[Mapping[str, Any]], folder: Path = Path()) -
     """
     from ffr_prep.reduction.methods.union import Union
 
+    _check_modes(requests)
     parts = tuple(_made(method_of(request["method"]), request, folder) for request in requests)
     return parts[0] if len(parts) == 1 else Union(parts)
+
+
+def _check_modes(requests: Sequence[Mapping[str, Any]]) -> None:
+    """Raises InputError where modes are asked for, and no method keeps any."""
+    asked = [name for name in ("modes", "frequency", "accuracy") if any(one.get(name) is not None for one in requests)]
+    methods = [request["method"] for request in requests]
+    if asked and not any(method_of(method).selects for method in methods):
+        raise InputError(
+            f"{asked[0]} says which normal modes to keep, and {' and '.join(methods)} keeps none: leave it out, or add the "
+            "method craig-bampton"
+        )
 
 
 def _made(entry: ReductionMethod, given: Mapping[str, Any], folder: Path) -> Reduction:

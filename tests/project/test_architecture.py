@@ -29,11 +29,12 @@ SHARED = "ffr_prep.common"
 FLOORS = {
     "ffr_prep": (
         "common", "body", "solvers", "mesh", "model", "reduction", "solids", "structures", "matrices", "interchange",
-        "report", "pipelines", "cli",
+        "report", "pipelines", "cli", "__main__",
     ),
     "ffr_dyn": (
         "functions", "scene", "variants", "equations", "kernels", "integrators", "compile", "closing", "results",
         "consistency", "linear", "pictures", "analyses", "realtime", "scene_file", "chart", "economy", "studies", "cli",
+        "__main__",
     ),
 }  # fmt: skip
 MOST_FLAT, MOST_IN_A_FOLDER = 12, 20
@@ -197,6 +198,7 @@ def asked_kinds(source: str, kinds: set[str]) -> set[str]:
 
 def test_forces_are_asked_what_they_do_and_not_of_which_kind_they_are():
     """What depends on the kind of a force stands in its own file (`ffr_dyn.scene.forces.force`)."""
+    import ffr_dyn.scene.forces  # noqa: F401 - which registers them
     from ffr_dyn.scene.force_kinds import FORCES
 
     kinds = {kind.__name__ for kind in FORCES}

@@ -10,11 +10,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from ffr_prep.body.accelerations import gradients
+from ffr_prep.common.arrays import Array
 from ffr_prep.model.coupled import CoupledModel
 from ffr_prep.model.reactions import inertial_loads
 from ffr_prep.reduction.basis import Basis, basis_of
 from ffr_prep.reduction.responses import static_response
 from ffr_prep.solvers.factor import FreeBody
+
+_ROUNDING = 1e-13  # of the largest load of a turn; that of a thread a millionth as thick as long is 1e-12
 
 
 @dataclass(frozen=True)
@@ -34,8 +37,12 @@ class InertiaRelief:
         return basis_of(model, L, static_response(model, body, held, central_loads(model)))
 
 
-def central_loads(model: CoupledModel) -> np.ndarray:
+def central_loads(model: CoupledModel) -> Array:
     """(Z, 12) the loads of unit accelerations about the middle of the model. About an origin far away turning and spinning
-    are next to translations, and what tells them apart would be lost in rounding."""
+    are next to translations, and what tells them apart would be lost in rounding. Loads that are none but for rounding, as a
+    straight beam's under spin about itself, are zero: their responses would be shapes without a meaning, and no symmetry of
+    the body."""
     loads = inertial_loads(model)
-    return np.hstack([loads[:, :3], loads[:, 3:] - loads[:, :3] @ (gradients() @ model.centre).T])
+    central = np.hstack([loads[:, :3], loads[:, 3:] - loads[:, :3] @ (gradients() @ model.centre).T])
+    rounding = _ROUNDING * np.abs(loads[:, 3:]).max(initial=0.0)
+    return np.asarray(central * (np.abs(central).max(axis=0, initial=0.0) > rounding))

@@ -139,6 +139,17 @@ def test_slow_dynamic_deformation_settles_to_the_quasi_static_one():
     assert np.abs(still["b.q"]).max() > 1e-3
 
 
+def test_dynamic_deformation_that_begins_quasi_static_does_not_ring():
+    scene = replace(
+        flexible_arm(), drivers=(Driver("one", "A", polynomial(0.0, 2.0)), Driver("two", "B", polynomial(0.3)))
+    )
+    span = {"end": 0.02, "output_step": 0.01}
+    still = inverse(scene, **span, elastic=QuasiStatic())["b.q"][0]
+    begun = inverse(scene, **span, elastic=Dynamic(RK4(2e-3), FINE, begin="quasi-static"))["b.q"]
+    np.testing.assert_allclose(begun, np.tile(still, (3, 1)), atol=1e-3 * np.abs(still).max())
+    assert np.abs(inverse(scene, **span, elastic=Dynamic(RK4(2e-3), FINE))["b.q"][0]).max() == 0
+
+
 def test_work_of_the_drivers_is_the_change_of_energy():
     scene = replace(flexible_arm(), gravity=(0, -9.81, 0))
     scene = replace(scene, bodies=tuple(replace(b, damping=0.0) for b in scene.bodies))

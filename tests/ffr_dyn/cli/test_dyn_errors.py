@@ -409,7 +409,7 @@ def test_flexible_scene_file_runs_from_the_command_line(monkeypatch, capsys, tmp
 
 
 def test_module_runs_as_a_command():
-    done = subprocess.run([sys.executable, "-m", "ffr_dyn.cli", "--help"], capture_output=True, text=True, cwd=ROOT)
+    done = subprocess.run([sys.executable, "-m", "ffr_dyn", "--help"], capture_output=True, text=True, cwd=ROOT)
     assert done.returncode == 0
     assert "animate" in done.stdout
 

@@ -16,7 +16,7 @@ from ffr_dyn.functions.rotation import euler_parameters, rotation_matrix
 from ffr_dyn.functions.time_functions import table
 from ffr_dyn.integrators import RK4
 from ffr_dyn.scene.drivers import Driver
-from ffr_dyn.scene.forces import Load
+from ffr_dyn.scene.forces import Load, SpringDamper
 from ffr_dyn.scene.joints import Joint
 from ffr_dyn.scene.scene import Body, Scene
 from ffr_prep.common.errors import ComputationError, InputError
@@ -58,6 +58,16 @@ def test_a_distance_that_starts_at_zero_or_below_is_refused(analysis, length):
 def test_a_distance_that_shrinks_to_zero_stops_the_run_there():
     with pytest.raises(ComputationError, match=r"at t = 0\.49\d* s the row 'distance of the points' of 'tie'"):
         forward(tied("distance", 0.5, length=formula("0.5 - t")), end=0.6, output_step=0.1, method=RK4(1e-3))
+
+
+def test_a_spring_without_a_free_length_is_told():
+    def told(**given):
+        springs = (SpringDamper("s", "ground.O", "a.b", **given),)
+        return [note for note in assemble(replace(tied("revolute"), springs=springs)).notes if "free_length" in note]
+
+    assert told(stiffness=10.0)[0].startswith("spring 's' has no free_length, so it pulls with its stiffness times all")
+    assert not told(stiffness=10.0, free_length=0.0)
+    assert not told(stiffness=0.0, damping=1.0)
 
 
 def test_a_force_on_the_ground_alone_is_told():

@@ -112,6 +112,14 @@ def test_outputs_that_hardly_move_are_measured_by_their_kind():
     assert scales["c.q"] == pytest.approx(1e-5)
 
 
+def test_forces_beside_torques_are_measured_by_the_torque_over_the_size():
+    """A shaft under torque pulls at its ends by next to nothing, which no step is to resolve."""
+    shaft = result(a_position=2.0 * TIME, a_moment=100.0 * TIME, a_force=1e-6 * TIME)
+    assert ranges(shaft)["a.force"] == pytest.approx(1e-3 * 100.0 / 2.0)
+    geared = result(a_position=2.0 * TIME, a_moment=100.0 * TIME, a_force=50.0 * TIME)
+    assert ranges(geared)["a.force"] == pytest.approx(50.0)
+
+
 @pytest.mark.parametrize(
     ("kind", "velocity"), [("spherical", (1.0, 2.0, 0.5)), ("cylindrical", (0, 0, 2.0)), ("revolute", (0, 0, 0.3))]
 )
@@ -240,6 +248,15 @@ def test_breaks_that_nobody_tells_are_those_of_python_functions_and_of_sharp_for
     assert not found(user(lambda t: float(t >= 0.3), breaks=[0.3]))
     assert found(user(lambda t: float(t >= 0.3)))["load 'push'"] == pytest.approx([0.3])
     assert found(formula("sqrt((t - 0.3) ** 2) + min(t, 0.6) ** 2"))[A_FORMULA] == pytest.approx([0.3], abs=1e-6)
+
+
+def test_what_trembles_before_it_is_driven_does_not_grow_by_itself():
+    """Rounding of a scene that rests until a cam lifts it, and of a stop that it then leaves."""
+    rests = 0.5 * TIME[-1] > TIME
+    tremble = np.where(TIME > 0, 1e-34 + 1e-16 * TIME, 0.0)
+    lift = np.where(rests, tremble, (TIME - 0.5 * TIME[-1]) ** 3)
+    force = np.where(rests, tremble, 10.0 ** np.minimum(2.0, -8 + 400 * (TIME - 0.5 * TIME[-1])))
+    assert from_rounding(result(a_position=lift, b_position=TIME, s_force=force)) == {}
 
 
 def test_exponential_growth_from_rounding_is_no_motion_that_sets_in():

@@ -26,6 +26,7 @@ FORMULAS = {
     "smooth(t - 0.2) + step(t - 0.1) * abs(t) + sign(t)": lambda t: (
         10 * (t - 0.2) ** 3 - 15 * (t - 0.2) ** 4 + 6 * (t - 0.2) ** 5 + t + 1
     ),
+    "ramp(t - 0.2)": lambda t: 2.5 * (t - 0.2) ** 4 - 3 * (t - 0.2) ** 5 + (t - 0.2) ** 6,
     "(1 + t) ** t": lambda t: (1 + t) ** t,
     "min(t, 0.5) + max(t, 0.5 * t)": lambda t: min(t, 0.5) + t,
     "(2 + t) ** -1.5 + t ** 3 + t ** 1 + t ** 0": lambda t: (2 + t) ** -1.5 + t**3 + t + 1,
@@ -64,7 +65,7 @@ def test_kernels_and_readable_form_number_the_operations_alike():
     from ffr_dyn.kernels import operations as compiled
 
     names = [name for name in vars(compiled) if name.isupper()]
-    assert len(names) == 19
+    assert len(names) == 20
     assert all(getattr(compiled, name) == getattr(operations, name) for name in names)
 
 
@@ -78,6 +79,13 @@ def test_smooth_rises_with_two_continuous_derivatives_and_stays():
     function = formula("smooth(t)")
     for t, value in ((-1.0, 0.0), (0.0, 0.0), (1.0, 1.0), (2.0, 1.0)):
         assert evaluate(function, t) == (value, 0.0, 0.0)
+
+
+def test_a_ramp_reaches_its_speed_and_goes_no_faster():
+    function = formula("3 * 0.5 * ramp(t / 0.5)")
+    assert max(evaluate(function, t)[1] for t in np.linspace(-0.1, 1.0, 111)) <= 3.0 + 1e-12
+    assert evaluate(function, -0.1) == (0.0, 0.0, 0.0)
+    assert evaluate(function, 1.0) == pytest.approx((3 * (1.0 - 0.25), 3.0, 0.0))
 
 
 def test_powers_have_derivatives_at_zero():

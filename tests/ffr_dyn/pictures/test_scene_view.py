@@ -60,6 +60,35 @@ def test_an_assembled_scene_is_drawn_once_with_all_that_is_named():
     assert {trace["name"] for trace in about["traces"]} == {"spring (SpringDamper)"}
 
 
+def hung(gravity):
+    """A weight on a rope, free in space."""
+    return fd.Scene(
+        (fd.Body("weight", link(0.3), position=(0.1, 0.2, -1.0)),),
+        (fd.Joint("rope", "distance", "ground.O", "weight.a", length=np.sqrt(1.05)),),
+        ground={"O": (0, 0, 0)},
+        gravity=gravity,
+    )
+
+
+def test_a_rope_is_drawn_from_end_to_end():
+    assert {trace["name"] for trace in Content(fd.show(hung((0, 0, -9.81))).text).about["traces"]} == {
+        "rope (distance)"
+    }
+
+
+@pytest.mark.parametrize(("gravity", "up"), [((0, 0, -9.81), 2), ((0, -9.81, 0), 1), ((9.81, 0, 0), 0)])
+def test_up_is_against_gravity_also_of_a_scene_at_rest(gravity, up):
+    camera = Content(fd.show(hung(gravity)).text).about["camera"]
+    assert np.argmax(np.abs(camera["up"])) == up
+    assert camera["up"][up] == -np.sign(gravity[up])
+    assert np.abs(camera["direction"]).min() > 0.5
+
+
+def test_a_planar_scene_is_seen_from_its_front():
+    camera = Content(fd.show(replace(crank(), gravity=(0, -9.81, 0))).text).about["camera"]
+    assert camera == {"direction": [0.2, 0.28, 1.0], "up": [0.0, 1.0, 0.0]}
+
+
 def test_what_assembly_moves_is_drawn_twice():
     seen = scene_view(crank(offset=0.2))
     assert seen.faint == {f"crank{DECLARED}", f"rod{DECLARED}"}

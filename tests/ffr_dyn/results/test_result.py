@@ -18,6 +18,7 @@ from places import ROOT, TESTS
 
 from ffr_dyn.results import file as result_file
 from ffr_dyn.results.file import ResultWriter, load_result, save_result
+from ffr_dyn.results.quantities import like
 from ffr_dyn.results.result import EULER_PARAMETERS, XYZ, Axis, Quantity, Result, mode_axis, table, write_csv
 from ffr_prep.body import Surface
 from ffr_prep.common.errors import ComputationError, InputError
@@ -494,3 +495,10 @@ def test_results_need_no_plotting_library():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
+
+
+def test_a_name_that_nothing_has_is_answered_by_what_is_near_and_not_by_everything():
+    names = [f"{body}.{what}" for body in ("rod", "crank") for what in ("R", "p", "q")]
+    assert like("rod.Q", names, 0.6) == "did you mean rod.q, rod.p, rod.R?"
+    assert like("rod.displacement", names, 0.6) == "of 'rod' there are: rod.R, rod.p, rod.q"
+    assert like("measured.*", names, 0.6) == "there are: rod.*, crank.*; `ffr-dyn info` lists those of a result"

@@ -389,6 +389,8 @@ def test_fields_of_ones_own(tmp_path, capsys):
         (["--method", "guess"], "is not known: write one of craig-bampton"),
         (["--modes", 3, "--frequency", 100], "both say how many modes"),
         (["--frequency", 100, "--accuracy", "1,2,3"], "both say how many modes"),
+        (["--method", "inertia-relief", "--accuracy", "1,2,3"], "accuracy says which normal modes to keep"),
+        (["--method", "inertia-relief", "--modes", 3], "leave it out, or add the method craig-bampton"),
         (["--accuracy", "1,2"], "3 numbers with commas"),
         (["--accuracy", "a,b,c"], "write numbers with commas"),
         (["--frequency", -1], "must be positive"),

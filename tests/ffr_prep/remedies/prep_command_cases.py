@@ -54,6 +54,7 @@ OPTIONS = [
     reduces("--parts two", "--modes 0 --parts 2"),
     reduces("--accuracy 10;20;3", "--modes 2"),
     reduces("--accuracy 10,20", "--frequency 2000"),
+    reduces("--method guyan --modes 2", "--method guyan --method craig-bampton --modes 2"),
     words("reduce block.inp --interface LEFT -o scene.toml", REDUCE),
     words(
         "reduce part.geo --interface surface_1 -o new.ffr",
