@@ -16,7 +16,7 @@ from ffr_dyn.equations.constraint_rows import Block
 from ffr_dyn.equations.constraints import Markers, coordinate
 from ffr_dyn.scene.followed import TURN, Coordinate, following, relations
 from ffr_dyn.scene.joints import RELATION, Word, coordinate_axes, frames
-from ffr_dyn.scene.scene import Scene, marker_number
+from ffr_dyn.scene.scene import marker_number
 from ffr_prep.common.arrays import Array
 
 

@@ -32,7 +32,6 @@ from ffr_dyn.results.power import (
 from ffr_dyn.results.recorded_motion import View, dot, times, to_axes
 from ffr_dyn.results.result import EULER_PARAMETERS, XYZ, Axis, Quantity, mode_axis
 from ffr_dyn.scene.couplings import Coupling
-from ffr_dyn.scene.drivers import Driver
 from ffr_dyn.scene.followed import following
 from ffr_dyn.scene.force_kinds import forces_of
 from ffr_dyn.scene.forces.places import COORDINATE, Measured, OnJoint

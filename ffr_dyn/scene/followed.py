@@ -12,7 +12,9 @@ TURN = 2 * np.pi
 
 Coordinate = tuple[str, str]  # a joint, and "angle" or "stroke"
 Relation = tuple[str, Coordinate, Coordinate, float, float]  # of a coupling or joint: second = ratio first + offset
-Follows = tuple[str | Coordinate, float, float]  # a driver or a coordinate, the factor by which it is followed, and an offset
+Follows = tuple[
+    str | Coordinate, float, float
+]  # a driver or a coordinate, the factor by which it is followed, and an offset
 
 
 def relations(scene: Scene) -> list[Relation]:

@@ -271,7 +271,9 @@ def _spread(name: str, kind: str, numbers: Sequence[Any]) -> Spread:
     """A distribution; with units where all its numbers have one, of a lognormal one its median."""
     pure = list(numbers[1:]) if kind == "lognormal" else []
     if not _are_numbers(pure):
-        raise InputError(f"parameters.{name}: lognormal {numbers}: the deviation of the logarithm is a number without a unit")
+        raise InputError(
+            f"parameters.{name}: lognormal {numbers}: the deviation of the logarithm is a number without a unit"
+        )
     found, unit = _in_si(name, numbers[: len(numbers) - len(pure)])
     return Spread(kind, (*found, *map(float, pure)), unit)
 
