@@ -63,6 +63,7 @@ def assembly(
         "method": "smallest changes in the norm of the mass matrix",
         "evaluations": int(at.work.info[EVALUATIONS]),
         "degrees_of_freedom": assembled.degrees_of_freedom,
+        "computed": assembled.computed,
         "notes": [*changes(assembled), *notes, *checked("assemble", assembled, record)],
         "status": "complete",
     }

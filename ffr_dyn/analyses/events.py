@@ -39,6 +39,7 @@ from ffr_prep.common.errors import InputError
 WIDTH = 4 * np.finfo(float).eps  # of a step, and relative: what brentq can reach
 ROUNDING = 1e-14  # of the times of a run: no moment is known better
 SHOWN = 3  # times in a note
+LEAST_BESIDE, BESIDE = 8, 0.05  # rows beside an event, and their part of all rows
 _FINER = "take a smaller step, or a value that is passed faster"
 
 
@@ -223,12 +224,20 @@ def _function(system: System, function: Callable[[float, StateView], float]) -> 
 
 
 def with_errors(
-    run: Result, errors: Mapping[str, StepError], other: Beside | None, order: float, twins: Sequence[Beside]
+    run: Result,
+    errors: Mapping[str, StepError],
+    other: Beside | None,
+    order: float,
+    twins: Sequence[Beside],
+    *,
+    between: bool = False,
 ) -> list[dict[str, Any]]:
     """The events of a run with the "error" [s] of each moment; None where a run with other steps does not pass it.
 
     errors              : of the outputs of the run
     other, order, twins : further runs, with the same events, as for `step_errors`
+    between             : states lie between steps of any length, so that two runs may be equally far off at one moment by
+                          chance: how far they are apart in the rows beside it is told at least
     """
     found, beside = run.attributes["events"], [*([] if other is None else [other]), *twins]
     times = [_of_the_same(found, one.result.attributes["events"]) for one in beside]
@@ -237,6 +246,8 @@ def with_errors(
     told = [Beside(moments, one.ratio) for moments, one in zip(others, beside, strict=True)]
     off = step_errors(own, None, order, told) if other is None else step_errors(own, told[0], order, told[1:])
     known = {k: max(off[str(n)].error, _shaken(found[k], errors)) for n, k in enumerate(sure)}
+    if between and other is not None:
+        known = {k: max(error, _apart(found[k], run, other.result)) for k, error in known.items()}
     least = ROUNDING * max(1e-300, *np.abs(run.time[[0, -1]]))
     return [event | {"error": max(least, known[k]) if k in known else None} for k, event in enumerate(found)]
 
@@ -265,6 +276,19 @@ def _shaken(event: Mapping[str, Any], errors: Mapping[str, StepError]) -> float:
     name = event["quantity"]
     told = errors.get(name) or errors.get(name.rpartition(".")[0])
     return told.error / abs(event["rate"]) if told is not None and told.vibrates and event["rate"] else 0.0
+
+
+def _apart(event: Mapping[str, Any], run: Result, other: Result) -> float:
+    """[s] by which the quantity of an event is apart in the rows beside it, over its rate; 0 where it is not kept."""
+    try:
+        values, theirs = (rows[event["quantity"]] for rows in (run, other))
+    except InputError:
+        return 0.0
+    count = max(LEAST_BESIDE, round(BESIDE * run.time.size))
+    near = np.argsort(np.abs(run.time - event["time"]), kind="stable")[:count]
+    near = near[near < min(values.size, theirs.size) - 1]  # the last row may be that of an event
+    apart = float(np.abs(values[near] - theirs[near]).max(initial=0.0))
+    return apart / abs(event["rate"]) if event["rate"] else 0.0
 
 
 def doubts(events: Sequence[Mapping[str, Any]], end: float, further: Sequence[Result]) -> list[str]:

@@ -155,6 +155,7 @@ def _quasi_static(
         "method": "Newton-Raphson",
         "evaluations": int(at.work.info[EVALUATIONS]),
         "degrees_of_freedom": assembled.degrees_of_freedom,
+        "computed": assembled.computed,
         "notes": [*assembled.notes, *checked("inverse", assembled, record)],
         "status": "complete",
     }

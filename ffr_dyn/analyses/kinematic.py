@@ -109,6 +109,7 @@ def kinematic(
         "method": "Newton-Raphson",
         "evaluations": followed.evaluations,
         "degrees_of_freedom": 0,
+        "computed": followed.assembled.computed,
         "notes": followed.notes,
         "status": "complete",
     }

@@ -265,6 +265,7 @@ def _not_collocated(
         "method": f"{chosen!r}",
         "evaluations": int(own.at.work.info[EVALUATIONS] + whole.free.work.info[EVALUATIONS]),
         "degrees_of_freedom": own.size,
+        "computed": assembled.computed,
         "internal_coordinates": list(own.names),
         "notes": [*assembled.notes, *notes, *doubted, *not_counted(own.angles, record)],
         "status": "complete",

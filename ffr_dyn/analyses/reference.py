@@ -132,6 +132,7 @@ def reference(
         "end": end,
         "output_step": output_step,
         "degrees_of_freedom": assembled.degrees_of_freedom,
+        "computed": assembled.computed,
         "evaluations": int(at.work.info[EVALUATIONS]),
         "notes": [*assembled.notes, *checked("forward", assembled, record)],
         "status": "complete",

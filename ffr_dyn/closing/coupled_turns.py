@@ -14,27 +14,21 @@ import numpy as np
 from ffr_dyn.closing.constraints import Constraints
 from ffr_dyn.equations.constraint_rows import Block
 from ffr_dyn.equations.constraints import Markers, coordinate
-from ffr_dyn.scene.couplings import coupled
-from ffr_dyn.scene.drivers import Driver
+from ffr_dyn.scene.followed import TURN, Coordinate, following, relations
 from ffr_dyn.scene.joints import RELATION, Word, coordinate_axes, frames
-from ffr_dyn.scene.scene import Scene, marker_number
+from ffr_dyn.scene.scene import marker_number
 from ffr_prep.common.arrays import Array
-
-TURN = 2 * np.pi
-
-Coordinate = tuple[str, str]  # a joint, and "angle" or "stroke"
-Relation = tuple[str, Coordinate, Coordinate, float, float]  # of a block: second = ratio first + offset
 
 
 def relations_off(constraints: Constraints, x: Array) -> Iterator[tuple[int, float, float]]:
     """Of the rows of couplings and screws that stand whole turns off at x, which meets all rows: the number of their function
     among the drives, by how much they are off, and what whole turns make of them."""
-    relations = _relations(constraints.scene)
-    if not relations:
+    said = relations(constraints.scene)
+    if not said:
         return
     rows = {block.name: (word, f) for block, word, f in _rows(constraints) if word.kind == RELATION}
-    off = {at: _off(constraints, x, at, value) for at, value in _prescribed(constraints, relations).items()}
-    for block, first, second, ratio, _ in relations:
+    off = {at: _off(constraints, x, at, value) for at, value in prescribed(constraints).items()}
+    for block, first, second, ratio, _ in said:
         if block in rows and first in off:
             word, function = rows[block]
             by = off[second] - ratio * off[first]
@@ -48,26 +42,11 @@ def _rows(constraints: Constraints) -> Iterator[tuple[Block, Word, int]]:
     return ((block, word, next(functions)) for block in constraints.blocks for word in block.words)
 
 
-def _relations(scene: Scene) -> list[Relation]:
-    found = [(c.name, *coupled(c), c.ratio, c.offset) for c in scene.couplings]
-    return found + [
-        (j.name, (j.name, "angle"), (j.name, "stroke"), j.pitch / TURN, 0.0) for j in scene.joints if j.pitch
-    ]
-
-
-def _prescribed(constraints: Constraints, relations: list[Relation]) -> dict[Coordinate, float]:
+def prescribed(constraints: Constraints) -> dict[Coordinate, float]:
     """The values of the driven coordinates, and of all that couplings and screws lead to from there."""
     values = {block.name: float(constraints.drives[f, 0]) for block, _, f in _rows(constraints) if block.driver}
-    drivers = [driver for driver in constraints.scene.drivers if isinstance(driver, Driver)]
-    found, before = {(driver.joint, driver.coordinate): values[driver.name] for driver in drivers}, 0
-    while len(found) > before:
-        before = len(found)
-        for _, first, second, ratio, offset in relations:
-            if first in found and second not in found:
-                found[second] = ratio * found[first] + offset
-            elif second in found and first not in found:
-                found[first] = (found[second] - offset) / ratio
-    return found
+    led = ((at, *how) for at, how in following(constraints.scene).items())
+    return {at: factor * values[of] + begun for at, of, factor, begun in led if isinstance(of, str)}
 
 
 def _off(constraints: Constraints, x: Array, at: Coordinate, value: float) -> float:

@@ -15,11 +15,12 @@ from functools import partial
 import numpy as np
 
 from ffr_dyn.closing.constraints import Constraints
-from ffr_dyn.closing.coupled_turns import TURN, relations_off
+from ffr_dyn.closing.coupled_turns import relations_off
 from ffr_dyn.closing.going_on import going_on
 from ffr_dyn.closing.positions import LARGEST_TURN, close_velocities, largest_turn
 from ffr_dyn.equations.kinematics import marker_directions
 from ffr_dyn.equations.layout import moved, to_body_axes
+from ffr_dyn.scene.followed import TURN
 from ffr_dyn.scene.joints import DRIVEN_ANGLE
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError

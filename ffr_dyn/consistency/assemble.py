@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ffr_dyn.closing.constraints import Constraints, constraints_of, rows_at, without
-from ffr_dyn.closing.coupled_turns import TURN
+from ffr_dyn.closing.coupled_turns import prescribed
 from ffr_dyn.closing.driven_angles import driven_angles, led_to_drivers
 from ffr_dyn.closing.going_on import going_on
 from ffr_dyn.closing.independence import independent_blocks
@@ -26,6 +26,7 @@ from ffr_dyn.consistency.validity import deflections
 from ffr_dyn.equations.constraint_rows import Block, blocks_of
 from ffr_dyn.equations.layout import Layout, initial_state
 from ffr_dyn.functions.overshoots import overshoots
+from ffr_dyn.scene.followed import TURN
 from ffr_dyn.scene.force_kinds import forces_of
 from ffr_dyn.scene.scene import Scene, altered, require_scene
 from ffr_dyn.scene.sensors import Measurement
@@ -153,15 +154,21 @@ def _beyond_tables(system: System) -> list[str]:
 
 
 def _uncounted(rows: Constraints, x: Array) -> list[str]:
-    """A note where drivers tell whole turns, and forces on angles are to begin within half a turn."""
-    begun = [
-        force.name for force in rows.scene.forces if (force.place.way, getattr(force, "turns", None)) == ("angle", 0)
-    ]
+    """A note where drivers, or couplings of these, tell whole turns, and forces on angles are to begin within half a turn."""
+    begun = {
+        force.name: force.place.joint
+        for force in rows.scene.forces
+        if (force.place.way, getattr(force, "turns", None)) == ("angle", 0)
+    }
     if not begun:
         return []
-    turns = max((round(angle.value / TURN) for angle in driven_angles(rows, x)), key=abs, default=0)
+    who, turns = "a driver", max((round(angle.value / TURN) for angle in driven_angles(rows, x)), key=abs, default=0)
+    if not turns:
+        led = {joint: round(value / TURN) for (joint, way), value in prescribed(rows).items() if way == "angle"}
+        begun = {name: joint for name, joint in begun.items() if led.get(joint)}
+        who, turns = "a coupling of what is driven", max((led[joint] for joint in begun.values()), key=abs, default=0)
     return [
-        f"a driver begins {turns} whole turns on, and {', '.join(map(repr, begun))} within half a turn, as `turns` says: "
+        f"{who} begins {turns} whole turns on, and {', '.join(map(repr, begun))} within half a turn, as `turns` says: "
         "where it has turned along, give it the whole turns of its joint"
     ] * (turns != 0)
 

@@ -24,6 +24,6 @@ def keep(m, w, t, x, v, out, k):
     reactions(m.rows, w.markers, w.rows, out.reaction[k])
     copy(out.forces[k], w.loads.measured)
     copy(part(out.functions, 3 * F * k, 3 * F), part(w.functions, 0, 3 * F))
-    kinetic, strain, gravity = energies(w.field, m.bodies, w.bodies, x, v, w.y[0], w.y[1])
+    kinetic, strain, gravity = energies(m.gravity, m.bodies, w.bodies, x, v, w.y[0], w.y[1])
     out.energy[k, 0], out.energy[k, 1], out.energy[k, 2] = kinetic, strain, gravity
     out.violation[k, 0], out.violation[k, 1] = largest(w.rows.Phi), largest(w.rows.nu)

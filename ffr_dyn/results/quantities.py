@@ -32,7 +32,7 @@ from ffr_dyn.results.power import (
 from ffr_dyn.results.recorded_motion import View, dot, times, to_axes
 from ffr_dyn.results.result import EULER_PARAMETERS, XYZ, Axis, Quantity, mode_axis
 from ffr_dyn.scene.couplings import Coupling
-from ffr_dyn.scene.drivers import Driver
+from ffr_dyn.scene.followed import following
 from ffr_dyn.scene.force_kinds import forces_of
 from ffr_dyn.scene.forces.places import COORDINATE, Measured, OnJoint
 from ffr_dyn.scene.joints import COORDINATES, Joint
@@ -386,11 +386,15 @@ def _measured(view: View, m: Measurement) -> Array:
 # ---- joint coordinates --------------------------------------------------------------------------------------------
 
 
+ASIDE = 0.5  # rad, so that rounding decides nothing where a coupling stands half a turn off
+
+
 def _joint_coordinates(system: System) -> Named:
+    known = following(system.scene)
     for number, joint in enumerate(system.scene.joints):
         if "angle" in COORDINATES[joint.kind]:
-            known = _angle_driver(system.scene, joint), _counted(system.scene, joint)
-            yield f"{joint.name}.angle", _unwound(number, *known)
+            led = (joint.name, "angle") in known
+            yield f"{joint.name}.angle", _unwound(number, led, _counted(system.scene, joint))
             rate = lambda view, j=number: angles(view, view.system.scene.joints[j])[1]  # type: ignore[misc]  # noqa: E731
             yield f"{joint.name}.angle_rate", _entry("rad/s", (), "rate of the joint angle", rate)
         if "stroke" in COORDINATES[joint.kind]:
@@ -398,16 +402,6 @@ def _joint_coordinates(system: System) -> Named:
                 text = ("joint stroke along its axis", "rate of the joint stroke")[k]
                 of = lambda view, j=number, k=k: strokes(view, view.system.scene.joints[j])[k]  # type: ignore[misc]  # noqa: E731
                 yield f"{joint.name}.{name}", _entry(unit, (), text, of)
-
-
-def _angle_driver(scene: Scene, joint: Joint) -> int | None:
-    """The number of what drives the angle of a joint."""
-    angular = (
-        k
-        for k, d in enumerate(scene.drivers)
-        if isinstance(d, Driver) and (d.joint, d.coordinate) == (joint.name, "angle")
-    )
-    return next(angular, None)
 
 
 def _counted(scene: Scene, joint: Joint) -> int | None:
@@ -419,15 +413,15 @@ def _counted(scene: Scene, joint: Joint) -> int | None:
     return next(on, None)
 
 
-def _unwound(number: int, driver: int | None, force: int | None) -> Entry:
-    """The angle of a joint, which begins within half a turn; with the whole turns of its driver, or those that a force has
-    counted since the start, if it has one."""
+def _unwound(number: int, led: bool, force: int | None) -> Entry:
+    """The angle of a joint, which begins within half a turn; with the whole turns of what it follows, or those that a force
+    has counted since the start, if it has one."""
 
     def compute(view: View, last: Unwound | Worked | None) -> tuple[Array, Unwound]:
         scene = view.system.scene
         moments, (angle, rate) = view.record.time, angles(view, scene.joints[number])
-        if driver is not None:
-            near = _asked(view, scene.drivers[driver])
+        if led:
+            near = _followed(view, scene.joints[number]) - ASIDE
         elif force is not None:
             near = _as_counted(view, force)
         else:
@@ -444,6 +438,17 @@ def _as_counted(view: View, force: int) -> Array:
     start = int(view.system.model.loads.row[force, MEASURED])
     counted: Array = view.record.forces[:, start + COORDINATE] - 2 * np.pi * place.turns
     return counted
+
+
+def _followed(view: View, joint: Joint) -> Array:
+    """(T,) the angle of a joint by what it follows: a driver, or a stroke."""
+    scene = view.system.scene
+    of, factor, begun = following(scene)[joint.name, "angle"]
+    if isinstance(of, str):
+        leads = _asked(view, next(driver for driver in scene.drivers if driver.name == of))
+    else:
+        leads = strokes(view, next(joint for joint in scene.joints if joint.name == of[0]))[0]
+    return np.asarray(factor * leads + begun)
 
 
 def _asked(view: View, driver: Any) -> Array:

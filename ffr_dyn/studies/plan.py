@@ -44,13 +44,13 @@ from ffr_dyn.scene_file.read import body_files
 from ffr_dyn.scene_file.source import read_source
 from ffr_dyn.studies.measures import HISTORY, Measured, measured
 from ffr_dyn.studies.runs import body_file
-from ffr_dyn.studies.sampling import USUAL, Axis, Sampling, Spread, Value, points, spaced
+from ffr_dyn.studies.sampling import USUAL, Axis, Sampling, Spread, Value, points, spaced, with_unit
 from ffr_prep.common.brief import Brief, cut
 from ffr_prep.common.entries import places_of
 from ffr_prep.common.errors import InputError
 from ffr_prep.common.reading import read_toml
 from ffr_prep.common.strict import complaint, entry_keys
-from ffr_prep.common.units import dimension_of, in_words, split_quantity
+from ffr_prep.common.units import dimension_of, in_words, split_quantity, to_si
 
 MAKING = ("reduce", "reduce-structure", "reduce-matrices")
 TAKEN = ("run", "row", "time", "message")  # columns that every table may have
@@ -241,8 +241,8 @@ def _values(name: str, given: Any) -> Axis | Spread:
         return _range(name, given)
     if isinstance(given, Mapping) and len(given) == 1 and "from" not in given:
         ((kind, numbers),) = given.items()
-        if isinstance(numbers, list) and _are_numbers(numbers):
-            return Spread(kind, tuple(map(float, numbers)))
+        if isinstance(numbers, list) and all(map(_is_value, numbers)):
+            return _spread(name, kind, numbers)
     raise InputError(
         f"parameters.{name} = {cut(repr(given))}: give finite numbers or texts such as [1, 2, 3], {{from = 1, to = 3, "
         "count = 5}, or a distribution such as {normal = [mean, deviation]}"
@@ -253,15 +253,43 @@ def _range(name: str, given: Mapping[str, Any]) -> Axis:
     spacing = given.get("spacing", "linear")
     if spacing not in ("linear", "log"):
         raise InputError(f"parameters.{name}: spacing is {spacing!r}; give linear or log")
-    start, end, count = given["from"], given["to"], given["count"]
-    if not (_are_numbers((start, end)) and type(count) is int):
+    count, ends = given["count"], [given["from"], given["to"]]
+    if not (all(map(_is_value, ends)) and type(count) is int):
         raise InputError(
-            f"parameters.{name}: from and to are numbers in SI units, count a whole one, not {dict(given)}"
+            f"parameters.{name}: from and to are numbers, both with a unit or both in SI units, count a whole one, not "
+            f"{dict(given)}"
         )
+    (start, end), unit = _in_si(name, ends)
     try:
-        return spaced(float(start), float(end), count, logarithmic=spacing == "log")
+        axis = spaced(start, end, count, logarithmic=spacing == "log")
     except (InputError, OverflowError) as error:
         raise InputError(f"parameters.{name}: {error}") from None
+    return Axis(tuple(with_unit(axis.values, unit)))
+
+
+def _spread(name: str, kind: str, numbers: Sequence[Any]) -> Spread:
+    """A distribution; with units where all its numbers have one, of a lognormal one its median."""
+    pure = list(numbers[1:]) if kind == "lognormal" else []
+    if not _are_numbers(pure):
+        raise InputError(
+            f"parameters.{name}: lognormal {numbers}: the deviation of the logarithm is a number without a unit"
+        )
+    found, unit = _in_si(name, numbers[: len(numbers) - len(pure)])
+    return Spread(kind, (*found, *map(float, pure)), unit)
+
+
+def _in_si(name: str, given: Sequence[Any]) -> tuple[list[float], str]:
+    """Numbers in SI units, and their unit if they have one. Raises InputError where only some have, or one of another
+    dimension."""
+    quantities = [split_quantity(one) if isinstance(one, str) else (float(one), "") for one in given]
+    try:
+        known = [(value, unit, dimension_of(unit)) for value, unit in filter(None, quantities)]
+        if len(known) < len(quantities) or len({(dimension, not unit) for _, unit, dimension in known}) > 1:
+            raise InputError("give numbers, all with units of one dimension or all in SI units")
+        unit = in_words(known[0][2]) if known and known[0][1] else ""
+        return [to_si(value, own) for value, own, _ in known], unit
+    except InputError as error:
+        raise InputError(f"parameters.{name}: {cut(repr(list(given)))}: {error}") from None
 
 
 def units_of(made: Study) -> dict[str, str]:

@@ -38,11 +38,12 @@ class Spread:
     """A parameter with a distribution: its name in scipy.stats and what that takes, loc and scale last.
 
     "normal" (mean, deviation), "uniform" (least, most), "triangular" (least, likeliest, most) and "lognormal" (median,
-    deviation of the logarithm) are written as people say them.
+    deviation of the logarithm) are written as people say them. With a unit, that of SI, its values are texts.
     """
 
     kind: str
     numbers: tuple[float, ...]
+    unit: str = ""
 
     def at(self, share: Array) -> Array:
         """Quantiles. Raises InputError for a distribution that there is not, or numbers that it does not take."""
@@ -85,6 +86,11 @@ USUAL = {
     "triangular": ("least", "likeliest", "most"),
     "lognormal": ("median", "deviation of the logarithm"),
 }
+
+
+def with_unit(values: Sequence[Value], unit: str) -> list[Value]:
+    """Numbers in SI as texts with their unit, each a word of a line that makes a body; as they are without one."""
+    return [f"{value!r}{unit}" for value in values] if unit else list(values)
 
 
 def spaced(start: float, end: float, count: int, *, logarithmic: bool = False) -> Axis:
@@ -137,10 +143,10 @@ def _check(axes: Mapping[str, Sequence[Value]], spreads: Mapping[str, Spread], s
 
 def _drawn(spreads: Mapping[str, Spread], samples: int, sampling: Sampling, seed: int) -> list[dict[str, Value]]:
     shares = _cube(len(spreads), samples, sampling, seed)
-    columns = []
+    columns = list[list[Value]]()
     for (name, spread), share in zip(spreads.items(), shares.T, strict=True):
         try:
-            columns.append(spread.at(share).tolist())
+            columns.append(with_unit(spread.at(share).tolist(), spread.unit))
         except InputError as error:
             raise InputError(f"parameters.{name}: {error}") from None
     return [dict(zip(spreads, row, strict=True)) for row in zip(*columns, strict=True)]

@@ -124,7 +124,7 @@ def components(scene: Scene, outputs: Sequence[str], time: float, who: str) -> t
 
     if not outputs or isinstance(outputs, str):
         raise InputError(f"{who} needs outputs: names of quantities in a list, such as rod.tip.acceleration")
-    known = assembly(scene, time=time, outputs=("default", "*.acceleration", "*.angular_velocity", "*.a"))
+    known = assembly(scene, time=time, outputs=("*",))
     found: list[str] = []
     for name in outputs:
         try:

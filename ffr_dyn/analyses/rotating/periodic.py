@@ -134,6 +134,7 @@ def periodic(
         "periods": found.periods,
         "returns": found.error,
         "degrees_of_freedom": assembled.degrees_of_freedom,
+        "computed": assembled.computed,
         **(_multipliers(of, found) if floquet else {}),
         **told,
         "notes": [*assembled.notes, *checked("static", assembled, record), *([UNKNOWN] if check and not told else [])],

@@ -120,7 +120,7 @@ def with_its_errors(runs: Runs, trial: Trial, other: Any, *longer: Any) -> Trial
     errors = without_faded(errors, trial.result, other, runs)
     if not errors:
         return replace(trial, twins=twins, errors={}, doubts=untold)
-    return replace(trial, twins=twins, errors=errors, **_moments(trial.result, errors, other, order, twins))
+    return replace(trial, twins=twins, errors=errors, **_moments(trial, errors, other, order, twins))
 
 
 def _by_shown_order(
@@ -136,14 +136,14 @@ def _by_shown_order(
 
 
 def _moments(
-    result: Result, errors: Mapping[str, StepError], other: Beside, order: float, twins: Sequence[Beside]
+    trial: Trial, errors: Mapping[str, StepError], other: Beside, order: float, twins: Sequence[Beside]
 ) -> dict[str, Any]:
     """The events of a run with their errors, if it has looked for any, and doubts about them."""
-    if "events" not in result.attributes:
+    if "events" not in trial.result.attributes:
         return {}
-    events = with_errors(result, errors, other, order, twins)
+    events = with_errors(trial.result, errors, other, order, twins, between=trial.method.controlled)
     further = [one.result for one in (other, *twins)]
-    return {"events": events, "doubts": doubts(events, float(result.time[-1]), further)}
+    return {"events": events, "doubts": doubts(events, float(trial.result.time[-1]), further)}
 
 
 def further_runs(

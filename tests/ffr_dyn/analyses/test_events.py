@@ -311,3 +311,25 @@ def test_mistakes_in_the_events_of_a_file(tmp_path):
         with pytest.raises(InputError, match=r"analysis\.events\.(low|top)") as caught:
             load_scene(path)
         assert words in str(caught.value)
+
+
+@pytest.mark.parametrize("value", [-1.963838631794485, -0.4, -1.1])
+def test_moments_between_steps_of_any_length_are_not_told_too_well_by_chance(value):
+    """Of a pendulum two runs may pass a value at nearly one moment, and both be off it by a hundred times that."""
+    body = rigid_body("b", mass=2.0, inertia=(1, 1, 0.2), centre_of_mass=(0.5, 0, 0), points={"p": (0, 0, 0)})
+    scene = Scene(
+        (Body("b", body, omega_bar=(0, 0, 2.0)),), (Joint("g", "revolute", "ground.O", "b.p"),),
+        ground={"O": (0, 0, 0)}, gravity=(0, -9.81, 0),
+    )  # fmt: skip
+    passed = forward(
+        scene, end=3.0, output_step=0.1, method=DormandPrince(), events=(Event("at", "g.angle", value),), check=True
+    )
+    swing = solve_ivp(
+        lambda t, y: (y[1], -9.81 * np.cos(y[0]) / 0.7), (0, 3), (0.0, 2.0), rtol=1e-12, atol=1e-13,
+        events=lambda t, y: y[0] - value, dense_output=True,
+    )  # fmt: skip
+    told = [event["error"] for event in passed.attributes["events"]]
+    off = np.abs(np.array(times(passed)) - swing.t_events[0])
+    assert len(told) == 3
+    assert (off < 5.0 * np.array(told)).all(), (off, told)
+    assert (off < 1e-5).all()

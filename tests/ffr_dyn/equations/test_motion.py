@@ -19,7 +19,6 @@ from ffr_dyn.compile.scene_tables import System, compile_scene
 from ffr_dyn.compile.workspace import new_record
 from ffr_dyn.consistency.assemble import RELAXATION, assemble
 from ffr_dyn.equations.constraint_rows import blocks_of
-from ffr_dyn.equations.forces import gravity_at
 from ffr_dyn.equations.inertia import energies, kept_integrals
 from ffr_dyn.equations.layout import layout, to_body_axes
 from ffr_dyn.equations.motion import equations_of_motion, position_rates
@@ -186,5 +185,5 @@ def test_recorded_energies_are_those_on_paper(name):
     for b, body in enumerate(scene.bodies):
         own = np.concatenate([y[place.rigid(b)], y[place.q_dot(b)]])
         R, A, integrals = x[place.R(b)], rotation_matrix(x[place.p(b)]), kept_integrals(body)
-        total += energies(integrals, R, A, x[place.q(b)], own, gravity_at(scene, T))
+        total += energies(integrals, R, A, x[place.q(b)], own, scene.gravity)
     np.testing.assert_allclose(record.energy[0], total, rtol=1e-12)

@@ -150,3 +150,10 @@ def test_the_torque_of_a_driver_that_turns_a_rotor_unevenly():
     )
     np.testing.assert_allclose(found["transfer"][:, 1] @ [1, 1j], 2.0 * (2j * np.pi * f) ** 2, rtol=1e-7)
     assert not any("motor.effort also answers" in note for note in found.attributes["notes"])
+
+
+@pytest.mark.parametrize("name", ["rail.force_joint", "m.c.orientation", "m.alpha_bar"])
+def test_every_quantity_is_an_output_by_its_components(name):
+    found = response(sliding(spring(40.0, 5.0)), (name,), frequencies=[1.0])
+    assert len(found.attributes["outputs"]) == (4 if name == "m.c.orientation" else 3)
+    assert all(output.startswith(f"{name}.") for output in found.attributes["outputs"])

@@ -251,3 +251,46 @@ def test_turns_of_a_driver_that_a_spring_does_not_count_are_told():
     found = fd.static(counted, time=0.5)
     assert found["coil.torque"][0] == pytest.approx(torque, rel=1e-9)
     assert not any("whole turns" in note for note in found.attributes["notes"])
+
+
+def pair(ratio: float, driver: str, screw: float | None = None, forces=()) -> Scene:
+    """Two wheels, the second `ratio` times as far as the first; with a pitch the second on a screw."""
+    second = {"kind": "revolute"} if screw is None else {"kind": "screw", "pitch": screw}
+    return Scene(
+        (Body("a", wheel("a", 0.02)), Body("b", wheel("b", 0.02))),
+        (Joint("one", "revolute", "ground.O", "a.o"), Joint("two", i="ground.O", j="b.o", **second)),
+        drivers=(Driver("motor", "one", fd.formula(driver)),),
+        couplings=(Coupling("gear", "one.angle", "two.angle", ratio, offset=0.2),),
+        forces=forces,
+        ground=GROUND,
+    )
+
+
+@pytest.mark.parametrize("ratio", [1.0, -0.5, 7 / 3, -20 / 40, 3.0])
+@pytest.mark.parametrize("begun", ["4*pi + 0.3", "-2*pi", "0.4*2*pi"])
+def test_the_angle_of_a_coupled_joint_has_the_turns_of_its_driver(ratio, begun):
+    """Not within half a turn: the coupling holds between the angles of the result."""
+    scene = pair(ratio, f"{begun} + 5*t")
+    forward = fd.forward(scene, end=1.0, output_step=0.1, method=fd.RK4(1e-2), check=False)
+    for found in (forward, fd.kinematic(scene, end=1.0, output_step=0.5), fd.assembly(scene)):
+        np.testing.assert_allclose(found["two.angle"], ratio * found["one.angle"] + 0.2, atol=1e-8)
+
+
+def test_the_angle_of_a_screw_and_of_a_pinion_have_the_turns_of_their_strokes():
+    """Drawn some turns along: a stroke tells them, whether something is driven or not."""
+    body = fd.rigid_body("nut", mass=1.0, inertia=(0.01,) * 3, points={"o": (0, 0, 0)})
+    screw = Joint("screw", "screw", "ground.O", "nut.o", pitch=0.01)
+    drawn = Scene((Body("nut", body, position=(0, 0, 0.0423)),), (screw,), ground=GROUND, gravity=(0, 0, 1.0))
+    found = fd.forward(drawn, end=0.5, output_step=0.1, method=fd.RK4(1e-2), check=False)
+    np.testing.assert_allclose(found["screw.angle"], 2 * np.pi * found["screw.stroke"] / 0.01, atol=1e-6)
+    assert found["screw.angle"][0] == pytest.approx(4.23 * 2 * np.pi, abs=2.0)
+
+
+def test_turns_of_a_coupling_that_a_spring_does_not_count_are_told():
+    """The motor begins within half a turn, what it drives three times as fast does not."""
+    coil = fd.JointSpring("coil", "two", stiffness=2.0)
+    notes = fd.static(pair(3.0, "2.5", forces=(coil,))).attributes["notes"]
+    assert any("a coupling of what is driven begins 1 whole turns on, and 'coil'" in note for note in notes)
+    counted = fd.static(pair(3.0, "2.5", forces=(replace(coil, turns=1),)))
+    assert not any("whole turns" in note for note in counted.attributes["notes"])
+    assert counted["coil.torque"][0] == pytest.approx(-2.0 * counted["two.angle"][0]) == pytest.approx(-15.4)

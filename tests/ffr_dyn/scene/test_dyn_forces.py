@@ -25,6 +25,7 @@ from ffr_dyn.functions.rotation import rotation_matrix
 from ffr_dyn.functions.time_functions import evaluate, harmonic, polynomial, table
 from ffr_dyn.integrators import RK4, ROS2
 from ffr_dyn.kernels.tables import OK
+from ffr_dyn.scene.drivers import Driver
 from ffr_dyn.scene.force_kinds import FORCES
 from ffr_dyn.scene.forces import (
     Actuator,
@@ -889,6 +890,19 @@ def test_varying_gravity_and_a_moving_base_add_up():
     constants = weight_on_a_spring(gravity=(0, polynomial(1.0), -9.81), base_acceleration=(2.0, 0, 0))
     np.testing.assert_array_equal(constants.gravity, [0, 1.0, -9.81])
     assert constants.base_acceleration == weight_on_a_spring(base_acceleration=(2.0, 0, 0)).base_acceleration
+
+
+@pytest.mark.parametrize("varying", ["gravity", "base_acceleration"])
+def test_energy_of_gravity_is_that_of_its_constant_components(varying):
+    """What varies is counted nowhere: of a weight that is held fast nothing changes, else its work is missing."""
+    wave = harmonic(amplitude=3.0, frequency=1.0, phase=0.5)
+    given = {"gravity": (0, 2.0, wave)} if varying == "gravity" else {"gravity": (0, 2.0, 0), varying: (0, 0, wave)}
+    scene = weight_on_a_spring(**given)
+    held = replace(scene, drivers=(Driver("stays", "guide", 0.7, coordinate="stroke"),))
+    still = integrate(held, end=1.0, output_step=0.1, method=RK4(1e-2))
+    np.testing.assert_allclose(still["energy.gravity"], 0.0, atol=1e-12)
+    free = integrate(scene, end=1.0, output_step=0.1, method=RK4(1e-3), outputs=("*",))
+    np.testing.assert_allclose(free["energy.total"], free["guide.stroke_rate"] ** 2, rtol=1e-9)
 
 
 def test_base_acceleration_needs_three_components():

@@ -226,7 +226,11 @@ def test_a_run_that_fails_is_a_row_with_its_message(folder):
     (("g = [1, 5, 9.81]", "g = []"), r"parameters.g = \[\]: give"),
     (("count = 4", "count = 1000000000000"), "there cannot be 1000000000000 values"),
     (("count = 4", "count = 2.5"), "count a whole one"),
-    (("g = [1, 5, 9.81]", "g = {normal = ['a', 1]}"), r"parameters.g = \{'normal': \['a', 1\]\}: give"),
+    (("g = [1, 5, 9.81]", "g = {normal = ['a', 1]}"), r"parameters.g: \['a', 1\]: give numbers, all with units"),
+    (("from = 0.5", "from = '0.5 m'"), r"parameters.length: \['0.5 m', 2.0\]: give numbers, all with units of one dimension"),
+    (("from = 0.5, to = 2.0", "from = '1 m', to = '2 s'"), "parameters.length: .*all with units of one dimension"),
+    (("from = 0.5, to = 2.0", "from = '1 mn', to = '2 mn'"), "parameters.length: .*unknown unit 'mn'"),
+    (("g = [1, 5, 9.81]", "g = {lognormal = ['1 m', '2 m']}"), "the deviation of the logarithm is a number without a unit"),
     (("scene =", "sampling = 'sobl'\nscene ="), r"sampling: .*'sobol' \(it is 'sobl'\)$"),
     (("hinge.angle: last", "hinge.angle: lats"), "did you mean 'last'"),
     (("hinge.angle: last", "hinge.angle"), "write it as QUANTITY"),
@@ -236,7 +240,7 @@ def test_a_run_that_fails_is_a_row_with_its_message(folder):
     (('"bar.toml"', '"rab.toml"'), "rab.toml.* does not exist"),
     (("g = [1", "g = [nan"), r"parameters.g = \[nan, .*finite numbers"),
     (("g = [1", "g = [true"), r"parameters.g = \[True, .*finite numbers"),
-    (("to = 2.0", "to = inf"), "parameters.length: from and to are numbers in SI units, count a whole one"),
+    (("to = 2.0", "to = inf"), "parameters.length: from and to are numbers, both with a unit or both in SI"),
     (("scene =", "seed = -1\nscene ="), "seed is -1; give a whole number, 0 or more"),
     (("scene =", "samples = 10\nscene ="), "samples = 10 changes nothing: no parameter has a distribution"),
     (("= force / g", "= forc / g"), "outputs.weight: in the formula 'forc / g', 'forc' is not known; did you mean 'force'"),
@@ -369,6 +373,32 @@ def test_parameters_with_units_are_numbers_in_si(folder, given, column, unit):
     assert made.units.get("length") == unit
     if unit:
         assert {path.name for path in fd.plot_study(made, folder / "p")} >= {"angle.png", "angle-tornado.png"}
+
+
+@pytest.mark.parametrize(("given", "expected", "unit"), [
+    ({"from": "50 cm", "to": "2 m", "count": 4}, [0.5, 1.0, 1.5, 2.0], "m"),
+    ({"from": "10 mm", "to": "1000 mm", "count": 3, "spacing": "log"}, [0.01, 0.1, 1.0], "m"),
+    ({"uniform": ["10 in", "20 in"]}, None, "m"),
+    ({"lognormal": ["10 in", 0.1]}, None, "m"),
+])  # fmt: skip
+def test_ranges_and_distributions_take_units(folder, given, expected, unit):
+    """They run as numbers in SI do, and the unit is looked at as that of any text."""
+    how = {"samples": 3} if "count" not in given else {}
+    study = fd.study(
+        folder / "bar.toml", {"length": given}, {"force": "hinge.force: last", "k": "= force * length"}, **how
+    )
+    found = fd.sweep(study, folder / "t.nc", workers=0)
+    assert not any(found.messages)
+    assert found.units.get("length") == unit
+    np.testing.assert_allclose(found["k"], found["force"] * found["length"])
+    if expected:
+        np.testing.assert_allclose(found["length"], expected, rtol=1e-15)
+    assert (np.abs(found["length"] - 1.0) < 1.5).all()
+    wrong = fd.study(
+        folder / "bar.toml", {"bodies.bar.mass": {"from": "1 m", "to": "2 m", "count": 2}}, {"a": "energy.total: last"}
+    )
+    with pytest.raises(ComputationError, match="the unit 'm' does not fit: this is given in kg"):
+        fd.sweep(wrong, folder / "w.nc", workers=0)
 
 
 def test_errors_are_found_where_a_study_asks_for_them_whatever_the_scene_says(folder):

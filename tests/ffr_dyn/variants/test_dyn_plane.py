@@ -9,6 +9,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+import ffr_dyn as fd
 import ffr_prep as fp
 from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.consistency.assemble import assemble, flat_form, flattened
@@ -411,3 +412,16 @@ def test_a_declared_plane_does_not_halve_a_mode(link):
     with pytest.raises(InputError, match=r"mode \d+ \(.*\) makes 0\.\d+ of its motion .*, of body 'one': reduce it"):
         flattened(double_pendulum(turned_modes(link, 0.6), plane="z"), 0.0)
     assert flattened(double_pendulum(turned_modes(link, 0.6)), 0.0)[0].plane == "none"
+
+
+def test_every_analysis_over_a_plane_says_that_it_was_computed_there():
+    scene, how = slider_crank(loads=()), {"end": 0.01, "output_step": 0.01}
+    results = [
+        fd.kinematic(scene, **how),
+        fd.assembly(scene),
+        fd.inverse(scene, elastic=fd.QuasiStatic(), **how),
+        fd.reference(scene, method=fd.SciPy("DOP853"), **how),
+        fd.forward(scene, method=ROS2(1e-3), check=False, **how),
+    ]
+    for found in results:
+        assert "in the plane, normal z" in found.attributes["computed"], found.attributes["analysis"]
