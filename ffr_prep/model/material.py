@@ -357,11 +357,15 @@ def _of_values(text: str, given: Mapping[str, Any], such: str) -> Solid:
 def _file(path: Path) -> dict[str, Any]:
     try:
         given = read_toml(path, "a material file")
-        return given | {key: _number(str(path), key, given[key]) for key in given.keys() & _NUMBERS}
+        return given | {key: _in_file(path, key, given[key]) for key in given.keys() & _NUMBERS}
     except InputError:
         raise
     except (ValueError, TypeError, OverflowError) as error:
         raise InputError(f"material file {str(path)!r} cannot be read: {error}") from None
+
+
+def _in_file(path: Path, key: str, value: Any) -> float:
+    return _number(str(path), key, value) if isinstance(value, str) else float(value)
 
 
 def _assignments(text: str) -> dict[str, str]:
@@ -373,11 +377,11 @@ def _assignments(text: str) -> dict[str, str]:
     return dict(pairs)
 
 
-def _number(text: str, key: str, value: Any) -> float:
-    """In SI units; a text may have a unit of its own, such as 210 GPa."""
+def _number(text: str, key: str, value: str) -> float:
+    """In SI units; the text may have a unit of its own, such as 210 GPa."""
     try:
-        return si_number(value, _UNIT.findall(KEYS[key])[-1]) if isinstance(value, str) else float(value)
+        return si_number(value, _UNIT.findall(KEYS[key])[-1])
     except InputError as error:
         raise InputError(f"material {text!r}: {key}: {error}") from None
-    except (ValueError, TypeError):
+    except ValueError:
         raise InputError(f"material {text!r}: {key} is {value!r}, which is not a number") from None

@@ -41,6 +41,7 @@ ITERATIONS = 40
 TOLERANCE = 1e-10  # of a correction, relative to the largest value
 ROUNDING = 1e-7  # the same, below which corrections that do not shrink any more are rounding
 FOLDS = 25.0  # e-folds of the slowest internal motion in the added times
+ENDS = 16  # steps of the added times at least, by which what the scheme has beside the internal dynamics has died away
 NEUTRAL = 1e-5  # of a real part, relative to the modulus, below which a direction is neutral
 STILL = 1e-3  # e-folds over the known motion, below which it is so too
 REST = 1e-6  # of a motion in the time that the known one lasts, at a speed or an acceleration
@@ -58,7 +59,7 @@ class Bounded:
     """Settings of the bounded solution.
 
     before, after : times [s] added to the known motion; default: 25 e-folds of the slowest motion that grows (before it) or
-                    decays (after it), at most twice as long as the motion
+                    decays (after it), at most twice as long as the motion, at least 16 steps
     parts         : of an output step, for collocation
 
     >>> result = fd.mixed(scene, unknown=(torque,), end=0.5, output_step=1e-3, solution=fd.Bounded(before=0.2, after=0.2))
@@ -122,13 +123,12 @@ def bounded_solution(
             f"the internal dynamics have {len(first.growing)} growing motions at the start and {len(last.growing)} at the "
             "end: there is no bounded solution that belongs to both"
         )
-    span = of.own.lasts
+    span, h = of.own.lasts, output_step / settings.parts
     before, after = (
-        _whole(min(FOLDS / rate, LONGEST * span) if wanted is None else wanted, output_step)
+        _whole(max(min(FOLDS / rate, LONGEST * span), ENDS * h) if wanted is None else wanted, output_step)
         for wanted, rate in ((settings.before, first.growth), (settings.after, last.decay))
     )
     rows = round(span / output_step) * settings.parts
-    h = output_step / settings.parts
     times = of.own.span[0] + h * np.arange(-before * settings.parts, rows + after * settings.parts + 1)
     path = _collocated(of, times, places, progress, _resting(of, times, places))
     notes = [
@@ -266,6 +266,7 @@ def _collocated(of: Plant, times: Array, places: list[_End], progress: Told, pat
     h, inside = float(times[1] - times[0]), np.linspace(*of.own.span, len(places))
     at = _between(inside, [end.slopes for end in places], times)
     count, size, before, done, first = PLACES, 0.0, np.inf, 0.0, 0.0
+    stiff, settled = 1.0 + h**2 * max(float(np.linalg.norm(end.slopes.by_y, 2)) for end in places), np.inf
     solve = _linear(at, places[0], places[-1], h)
     for _ in range(ITERATIONS):
         try:
@@ -280,12 +281,14 @@ def _collocated(of: Plant, times: Array, places: list[_End], progress: Told, pat
             progress(float(times[0] + (times[-1] - times[0]) * done))
         scale = max(float(np.abs(path.y).max()), 1e-6)
         first = first or size
-        if size < max(TOLERANCE * scale, enough * first) or ROUNDING * scale > size > SLOW * before:
+        # what rounding is in y, the vibrations that the step does not resolve make larger in h^2 y_ddot
+        moved = max(float(np.abs(step[0]).max(initial=0.0)), float(np.abs(step[1]).max(initial=0.0)) / stiff)
+        if size < max(TOLERANCE * scale, enough * first) or ROUNDING * scale > moved > SLOW * settled:
             return path
         if size > SLOW * before and count < times.size:
             count = min(2 * count, times.size)
             solve = _linear(_renewed(of, times, path, h, count), places[0], places[-1], h)
-        before = size
+        before, settled = size, moved
     raise ComputationError(
         f"the bounded solution did not converge: the last correction was {size:.3g}; use a smaller output step or more parts"
     )

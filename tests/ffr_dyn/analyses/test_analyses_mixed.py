@@ -200,8 +200,8 @@ def rest_to_rest(height: float, span: float):
     return piecewise([0.0, span], (height * s / span ** np.arange(8.0))[None])
 
 
-def one_link(*drivers) -> Scene:
-    beam = planar_beam("arm", 1.0, 0.5, 30.0, 2)
+def one_link(*drivers, EI: float = 30.0) -> Scene:
+    beam = planar_beam("arm", 1.0, 0.5, EI, 2)
     hub = rigid_body("hub", mass=0.2, inertia=(0.02, 0.02, 0.02), points={"axle": (0, 0, 0), "flange": (0, 0, 0)})
     return Scene(
         (Body("hub", hub), Body("arm", beam, damping=0.01)),
@@ -248,6 +248,19 @@ def test_tip_path_known_needs_the_moment_before_the_motion():
         stabilisation=FINE,
     )
     np.testing.assert_allclose(run["arm.tip.position.y"], found["arm.tip.position.y"], atol=4e-7)
+
+
+@pytest.mark.parametrize(("EI", "output_step", "share"), [(3e5, 0.02, 2e-3), (3e11, 0.05, 1e-2)])
+def test_an_arm_far_stiffer_than_the_step_resolves_is_moved_as_a_rigid_one(EI, output_step, share):
+    """Nothing is done before the motion begins, and then what a rigid arm needs: the tip of a bar of 1 m goes to y = sin a."""
+    found = mixed(one_link(TIP, EI=EI), unknown=(MOTOR,), end=0.6, output_step=output_step)
+    turn = formula("asin(0.4 * (t/0.6)**4 * (35 - 84*(t/0.6) + 70*(t/0.6)**2 - 20*(t/0.6)**3))")
+    driven = one_link(Driver("turn", "bearing", turn), EI=EI)
+    rigid = inverse(driven, end=0.6, output_step=output_step, elastic=QuasiStatic())
+    moment, moving = found["motor.effort"], (found.time > -1e-9) & (found.time < 0.6 + 1e-9)
+    largest = np.abs(moment).max()
+    assert np.abs(moment[found.time < -1e-9]).max() < 1e-3 * largest
+    np.testing.assert_allclose(moment[moving], rigid["turn.effort"], atol=share * largest)
 
 
 @pytest.mark.slow
