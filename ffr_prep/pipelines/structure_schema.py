@@ -65,6 +65,18 @@ class TubeEntry(Strict):
     t: Metres
 
 
+class BoxEntry(Strict):
+    """A rectangular hollow section.
+
+    b : width along z' [m];  h : height along y' [m];  t : thickness of the walls [m]
+    """
+
+    shape: Literal["box"]
+    b: Metres
+    h: Metres
+    t: Metres
+
+
 class IEntry(Strict):
     """An I with equal flanges, its web along y'.
 
@@ -96,7 +108,9 @@ class GeneralEntry(Strict):
     kz: float | None = None
 
 
-SectionEntry = Annotated[RectangleEntry | CircleEntry | TubeEntry | IEntry | GeneralEntry, Field(discriminator="shape")]
+SectionEntry = Annotated[
+    RectangleEntry | CircleEntry | TubeEntry | BoxEntry | IEntry | GeneralEntry, Field(discriminator="shape")
+]
 
 
 class MaterialEntry(Strict):
