@@ -301,7 +301,7 @@ class SolidEntry(Strict):
     unit : of the lengths in the file; without it that of the file, or metres
     size : of elements, in the unit of the geometry
     numbers : values of the constants that a .geo declares by DefineConstant
-    order : of the elements
+    order : of the elements, when geometry is meshed; 2 when not given
     glue : solids of a CAD file that touch share the faces between them
     """
 
@@ -311,7 +311,7 @@ class SolidEntry(Strict):
     unit: Literal["m", "cm", "mm", "in"] | None = None
     size: float | None = None
     numbers: dict[str, float] = {}
-    order: Literal[1, 2] = 2
+    order: Literal[1, 2] | None = None
     glue: bool = False
 
 
