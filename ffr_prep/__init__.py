@@ -88,7 +88,7 @@ _BY_MODULE = {
     "ffr_prep.structures.frame_geometry": "read_frame",
     "ffr_prep.structures.model": "from_frame",
     "ffr_prep.structures.nodal_integrals": "NodalIntegrals nodal_integrals",
-    "ffr_prep.structures.sections": "Section circle general i_section rectangle shear_rigid shifted tube "
+    "ffr_prep.structures.sections": "Section box circle general i_section rectangle shear_rigid shifted tube "
     "with_mass_moments",
 }
 __all__, __getattr__, __dir__ = front_door(__name__, _BY_MODULE)
@@ -173,7 +173,7 @@ if TYPE_CHECKING:  # the same names, for editors and checkers of types
     from ffr_prep.structures.model import from_frame as from_frame
     from ffr_prep.structures.nodal_integrals import NodalIntegrals as NodalIntegrals, nodal_integrals as nodal_integrals
     from ffr_prep.structures.sections import (
-        Section as Section, circle as circle, general as general, i_section as i_section,
+        Section as Section, box as box, circle as circle, general as general, i_section as i_section,
         rectangle as rectangle, shear_rigid as shear_rigid, shifted as shifted, tube as tube,
         with_mass_moments as with_mass_moments,
     )

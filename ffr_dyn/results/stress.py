@@ -41,6 +41,7 @@ _FORCE_AXIS, _MOMENT_AXIS = Axis(*FORCE_AXIS), Axis(*MOMENT_AXIS)
 
 _CHUNK = 4_000_000  # components of stress held at once: 32 MB
 _APART = 0.1  # of the body's size, between two hot spots
+_ROUNDING = 1e-12  # of the body's size: a coordinate of a hot spot below it is zero
 
 
 # ---- tensors ------------------------------------------------------------------------------------------------------
@@ -148,14 +149,16 @@ def hot_spots(
 def _spots(result: Result, body: str, quantity: str, count: int) -> Iterator[HotSpot]:
     surface = stressed_surface(result, body)
     values, rows = peaks(result, body, quantity)
+    size = _size(surface)
     free = np.ones(len(values), bool)
     for _ in range(count):
         if not free.any():
             return
         point = int(np.argmax(np.where(free, np.abs(values), -1.0)))
         position, row = surface.points[point], int(rows[point])
-        yield HotSpot(body, point, tuple(position.tolist()), row, float(result.time[row]), float(values[point]))
-        free &= np.linalg.norm(surface.points - position, axis=1) > _APART * _size(surface)
+        place = np.where(np.abs(position) < _ROUNDING * size, 0.0, position)
+        yield HotSpot(body, point, tuple(place.tolist()), row, float(result.time[row]), float(values[point]))
+        free &= np.linalg.norm(surface.points - position, axis=1) > _APART * size
 
 
 def stress_histories(result: Result, body: str, places: Mapping[str, Array], quantity: str = "von-mises") -> Result:

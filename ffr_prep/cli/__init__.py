@@ -125,9 +125,7 @@ _MESH = bundle(
     click.option(
         "--order",
         type=click.IntRange(1, 2),
-        default=2,
-        show_default=True,
-        help="Of the elements, when geometry is meshed.",
+        help="Of the elements, when geometry is meshed; default: 2.",
     ),
     GLUE,
     SOLIDS,
@@ -191,7 +189,7 @@ def reduce(mesh: Path, materials: tuple[str, ...], regions: tuple[str, ...], **o
     """
     from ffr_prep.cli.options import own_or_given
     from ffr_prep.mesh.geometry.skin import with_regions
-    from ffr_prep.mesh.mesh import read_mesh
+    from ffr_prep.mesh.mesh import element_order, read_mesh
     from ffr_prep.pipelines.file_materials import CARRIERS
     from ffr_prep.report.text import mesh_lines
     from ffr_prep.solids.model import from_mesh
@@ -212,7 +210,8 @@ def reduce(mesh: Path, materials: tuple[str, ...], regions: tuple[str, ...], **o
     every, reference = at_regions(loaded, interfaces, request.reference)
     show(reference_lines(request.reference, reference, interfaces))
     material = own_or_given(mesh, loaded, settings["unit"], given)
-    source = {"file": mesh.name, **{key: settings[key] for key in ("unit", "size", "numbers", "order")}}
+    source = {"file": mesh.name, **{key: settings[key] for key in ("unit", "size", "numbers")}}
+    source |= {"order": element_order(mesh, settings["order"])}
     source |= {key: value for key, value in (("glue", settings["glue"]), ("solids", list(settings["solids"]))) if value}
     request = replace(request, reference=reference, provenance={"source": source, "notes": list(loaded.notes)})
     reduce_to_file(

@@ -24,7 +24,10 @@ def extent_in_words(points: Array) -> str:
 
 
 def settings_in_words(value: Any) -> str:
-    """Nested settings in one line."""
+    """Nested settings in one line; what has a name by it, and the rest in brackets."""
+    if isinstance(value, Mapping) and "type" in value and "name" in value:
+        rest = settings_in_words({k: v for k, v in value.items() if k not in ("type", "name")})
+        return f"{value['name']} ({rest})" if rest else str(value["name"])
     if isinstance(value, Mapping):
         words = [f"{k} {settings_in_words(v)}" for k, v in value.items() if k != "type" and v not in (None, {}, [])]
         return " ".join([*([value["type"]] if "type" in value else []), ", ".join(words)]).strip()

@@ -42,6 +42,7 @@ _COINCIDENT = 1e-9
 _DOUBTFUL_LENGTH = 20.0
 _LONG, _SHORT = 100.0, 3e-4  # bodies beyond are told of, whatever their unit [m]
 _SHOWN_PARTS = 5
+_USUAL_ORDER = 2
 _SOLIDS_ALONE = (
     "bodies are made of solids here: fill a closed surface with solids where the mesh is made; a frame of beams and plates "
     "is described by a structure file, for `ffr-prep reduce-structure`"
@@ -109,7 +110,7 @@ def read_mesh(
     unit: str | None = None,
     size: float | None = None,
     numbers: Mapping[str, float] | None = None,
-    order: int = 2,
+    order: int | None = None,
     glue: bool = False,
     solids: Sequence[str] = (),
     most_elements: float = MOST_ELEMENTS,
@@ -122,7 +123,8 @@ def read_mesh(
                or IGES file declares is refused
     size     : largest element edge when geometry is meshed, in the unit of the file [m, cm, mm or in]
     numbers  : parameters of a .geo script to change, by name, lengths in the unit of the script [m, mm ...]
-    order    : 1 or 2, of the elements when geometry is meshed; second-order elements follow curved surfaces
+    order    : 1 or 2, of the elements when geometry is meshed, 2 when not given; second-order elements follow curved
+               surfaces
     glue     : solids of a CAD file that touch share the faces between them, and are one body then
     solids   : of a CAD file, the names of those to keep, or patterns such as "volume_1" or "arm*"; all when not given
     most_elements : [1] a geometry whose size, or whose fine curves, ask for more is refused before it is meshed
@@ -140,7 +142,8 @@ def read_mesh(
     progress("read the mesh")
     entry = format_of(path)
     of_cad = cad_settings(path, glue=glue, solids=solids, most_elements=most_elements)
-    of_geometry = {"unit": unit, "size": size, "numbers": numbers, "order": order} | of_cad if entry.geometry else {}
+    made_with = {"unit": unit, "size": size, "numbers": numbers, "order": element_order(path, order)}
+    of_geometry = made_with | of_cad if entry.geometry else {}
     with reading(path, "a mesh or a geometry"):
         read: FileMesh = loaded(entry.read)(path, **of_geometry)
         if not read.blocks:
@@ -165,17 +168,29 @@ def cad_settings(
     return {key: value for key, value in given.items() if value != usual[key]}
 
 
-def check_request(path: Path, unit: str | None, size: float | None, numbers: Mapping[str, float], order: int) -> None:
+def element_order(path: Path, order: int | None) -> int | None:
+    """That of the elements that a geometry is meshed with, 2 when not given; None of a mesh, which has its own."""
+    return (order or _USUAL_ORDER) if format_of(path).geometry else None
+
+
+def check_request(
+    path: Path, unit: str | None, size: float | None, numbers: Mapping[str, float], order: int | None
+) -> None:
     """Raises InputError for a unit, size, parameter, order or file that cannot be used."""
     if unit is not None and unit not in METRES:
         raise InputError(f"unit {unit!r} is not known; the units are {', '.join(METRES)}")
     if size is not None and not 0 < size < np.inf:
         raise InputError(f"element size {size} cannot be used; it must be positive")
-    if order not in (1, 2):
+    if order not in (1, 2, None):
         raise InputError(f"element order {order} cannot be used; it must be 1 or 2")
     check_ordinary(path, "a mesh or a geometry")
     if size is not None and not format_of(path).geometry:
         raise InputError(f"{path} is meshed already, so an element size has no effect; leave it out")
+    if order is not None and not format_of(path).geometry:
+        raise InputError(
+            f"{path} is meshed already, so an order of the elements has no effect; leave it out, or mesh with "
+            f"elements of order {order} where the file is made"
+        )
     if numbers and not format_of(path).parameters:
         raise InputError(f"{path} has no parameters to set ({', '.join(numbers)}); only .geo scripts have")
 

@@ -58,7 +58,7 @@ def rigid_part(
     if not 0 < density < np.inf:
         raise InputError(f"the density is {density} kg/m^3; it must be positive")
     Material("of the part", 1.0, 0.0, density)  # refuses what no solid has
-    check_request(path, unit, None, numbers, 1)
+    check_request(path, unit, None, numbers, None)
     part = _geometry(path, unit, numbers, solids)
     faces, solid = part.faces, part.solid
     points = {interface.name: _place(part, interface) for interface in interfaces}
@@ -103,7 +103,7 @@ def _geometry(path: Path, unit: str | None, numbers: Mapping[str, float], solids
             ]
             return _Part(skin_faces(skin), _together(known), _overlapping(skin.overlaps, skin.unit or "m"))
     cad_settings(path, glue=False, solids=solids)
-    mesh = read_mesh(path, unit=unit, numbers=numbers, order=2 if format_of(path).geometry else 1)
+    mesh = read_mesh(path, unit=unit, numbers=numbers)
     check_mesh(mesh)
     middles = {name: mesh.points[nodes].mean(axis=0) for name, nodes in mesh.node_groups.items()}
     return _Part(mesh_faces(mesh), _integrated(mesh), node_groups=middles)

@@ -63,7 +63,7 @@ from ffr_prep.solids.model import from_mesh
 from ffr_prep.structures.frame import Frame, Member, Shell, joined, named, panel, polyline, triangulated
 from ffr_prep.structures.frame_geometry import read_frame
 from ffr_prep.structures.model import from_frame
-from ffr_prep.structures.sections import Section, circle, general, i_section, rectangle, shear_rigid, shifted, tube
+from ffr_prep.structures.sections import Section, box, circle, general, i_section, rectangle, shear_rigid, shifted, tube
 
 
 @dataclass(frozen=True)
@@ -249,6 +249,7 @@ def _section(entry: MemberEntry) -> Section:
         "rectangle": rectangle,
         "circle": circle,
         "tube": tube,
+        "box": box,
         "i": i_section,
         "general": lambda **given: general("general", **given),
     }

@@ -65,6 +65,18 @@ class TubeEntry(Strict):
     t: Metres
 
 
+class BoxEntry(Strict):
+    """A rectangular hollow section.
+
+    b : width along z' [m];  h : height along y' [m];  t : thickness of the walls [m]
+    """
+
+    shape: Literal["box"]
+    b: Metres
+    h: Metres
+    t: Metres
+
+
 class IEntry(Strict):
     """An I with equal flanges, its web along y'.
 
@@ -96,7 +108,9 @@ class GeneralEntry(Strict):
     kz: float | None = None
 
 
-SectionEntry = Annotated[RectangleEntry | CircleEntry | TubeEntry | IEntry | GeneralEntry, Field(discriminator="shape")]
+SectionEntry = Annotated[
+    RectangleEntry | CircleEntry | TubeEntry | BoxEntry | IEntry | GeneralEntry, Field(discriminator="shape")
+]
 
 
 class MaterialEntry(Strict):
@@ -287,7 +301,7 @@ class SolidEntry(Strict):
     unit : of the lengths in the file; without it that of the file, or metres
     size : of elements, in the unit of the geometry
     numbers : values of the constants that a .geo declares by DefineConstant
-    order : of the elements
+    order : of the elements, when geometry is meshed; 2 when not given
     glue : solids of a CAD file that touch share the faces between them
     """
 
@@ -297,7 +311,7 @@ class SolidEntry(Strict):
     unit: Literal["m", "cm", "mm", "in"] | None = None
     size: float | None = None
     numbers: dict[str, float] = {}
-    order: Literal[1, 2] = 2
+    order: Literal[1, 2] | None = None
     glue: bool = False
 
 

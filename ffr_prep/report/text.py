@@ -23,6 +23,7 @@ _MOST_NAMES = 20
 _MOST_INTERFACES = 24
 _CLOSE = 0.01
 _NOISE = 1e-6
+_DRAWN = ("outline", "shear")
 
 
 def mesh_lines(mesh: Mesh) -> Iterator[str]:
@@ -299,11 +300,32 @@ def _origin_lines(provenance: Mapping[str, Any]) -> Iterator[str]:
             "regions",
             "command",
         ):
-            yield f"{key:12}{settings_in_words(value)}"
+            yield from _entry_lines(key.replace("_", " "), value)
     if provenance.get("command"):
         yield f"command     ffr-prep {shlex.join(map(str, provenance['command']))}"
     for warning in provenance.get("warnings", []):
         yield f"warning     {warning}"
+
+
+def _entry_lines(label: str, value: Any) -> Iterator[str]:
+    """A line of an entry, and of several like it (members, parts by name) one of each."""
+    several: list[Any] = [value]
+    if isinstance(value, list) and all(isinstance(one, Mapping) for one in value):
+        several = value
+    elif isinstance(value, Mapping) and all(isinstance(one, Mapping) for one in value.values()):
+        several = [{name: one} for name, one in value.items()]
+    for k, one in enumerate(several):
+        yield f"{label if k == 0 else '':11} {settings_in_words(_undrawn(one))}"
+
+
+def _undrawn(value: Any) -> Any:
+    """Without the points that are drawn of a section and the shear there, long tables that its shape implies."""
+    if isinstance(value, list):
+        return [_undrawn(one) for one in value]
+    if not isinstance(value, Mapping):
+        return value
+    left_out = _DRAWN if value.get("type") == "Section" else ()
+    return {key: _undrawn(one) for key, one in value.items() if key not in left_out}
 
 
 def _names(groups: Mapping[str, object]) -> str:

@@ -46,7 +46,7 @@ def read_frame(
     """
     path, numbers = Path(path), dict(numbers or {})
     members, shells = dict(members or {}), dict(shells or {})
-    check_request(path, unit, size, numbers, 1)
+    check_request(path, unit, size, numbers, None)
     if path.suffix.lower() not in SUFFIXES:
         raise InputError(f"{path}: frames are read from {', '.join(SUFFIXES)}; convert it with gmsh -save to .msh")
     progress("read the frame")

@@ -46,7 +46,7 @@ def faces(
     >>> print(fp.faces("plate.step"))
     """
     path, numbers = Path(path), dict(numbers or {})
-    check_request(path, unit, size, numbers, 1)
+    check_request(path, unit, size, numbers, None)
     settings = cad_settings(path, glue=glue, solids=solids)
     if not format_of(path).geometry:
         made = mesh_faces(read_mesh(path, unit=unit))

@@ -23,7 +23,7 @@ from ffr_dyn.functions.time_functions import harmonic, polynomial
 from ffr_dyn.integrators import ROS2
 from ffr_dyn.pictures.animate import animate
 from ffr_dyn.pictures.film import film
-from ffr_dyn.pictures.stress_report import behind, report_lines, stress_report
+from ffr_dyn.pictures.stress_report import StressReport, behind, report_lines, stress_report
 from ffr_dyn.results.file import load_result, save_result
 from ffr_dyn.results.result import Quantity, Result, mode_axis
 from ffr_dyn.results.stress import (
@@ -204,6 +204,23 @@ def test_hot_spots_are_the_largest_and_apart():
     distance = np.linalg.norm(places[:, None] - places, axis=-1) + np.eye(len(places))
     assert distance.min() > 0.1
     assert [s.value for s in spots] == sorted((s.value for s in spots), reverse=True)
+
+
+def test_the_place_of_a_hot_spot_holds_no_rounding():
+    result = stressed_box()
+    surface = result.geometry["rod"]
+    first = hot_spots(result, count=1)[0].point
+
+    def hottest_at(y, z):
+        points = surface.points.copy()
+        points[first, 1:] = y, z
+        return hot_spots(replace(result, geometry={"rod": replace(surface, points=points)}), count=1)[0]
+
+    spot = hottest_at(2.1431e-17, -2.1431e-17)
+    assert (spot.point, spot.position) == (first, (surface.points[first, 0], 0.0, 0.0))
+    told = list(report_lines(StressReport("von-mises", (spot,), {}, ())))
+    assert "(      0.5,         0,         0)" in told[1]
+    assert hottest_at(2e-9, -3e-9).position == (surface.points[first, 0], 2e-9, -3e-9)
 
 
 def test_hot_spots_of_several_bodies_are_one_list():

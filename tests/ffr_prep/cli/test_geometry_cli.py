@@ -132,6 +132,7 @@ def test_solids_are_glued_or_chosen(folder, capsys):
         (("faces", "plate4.step", "--unit", "m"), "declares that its numbers are mm"),
         (("faces", "plate4.step", "--find", "bore r=7"), "finds no face. Near are"),
         (("faces", "plate4.msh", "--glue"), "meshed already"),
+        (("mesh", "plate4.msh", "--order", "2"), "so an order of the elements has no effect; leave it out"),
         (("faces", "plate4.step", "--page", "plate4.step"), "it is written as .html, not .step"),
         (("rigid", "plate4.step", "-o", "a.ffr"), "give the density, such as --density 7850, or a --material"),
         (("rigid", "plate4.step", "--density", "1", "--material", "steel", "-o", "a.ffr"), "give the density"),

@@ -880,6 +880,9 @@ def test_parameters_of_an_included_script(tmp_path):
 def test_arguments_that_would_be_ignored(written_by_gmsh):
     with pytest.raises(InputError, match="meshed already"):
         read_mesh(written_by_gmsh / "tet4.msh", size=0.1)
+    for order in (1, 2):
+        with pytest.raises(InputError, match=f"meshed already, .* elements of order {order} where the file is made"):
+            read_mesh(written_by_gmsh / "tet4.msh", order=order)
     with pytest.raises(InputError, match=r"only \.geo scripts have"):
         read_mesh(written_by_gmsh / "tet4.msh", numbers={"x": 1.0})
 

@@ -28,7 +28,7 @@ from ffr_prep.reduction.methods.rubin import Rubin
 from ffr_prep.reduction.methods.union import Union
 from ffr_prep.reduction.selection import Accuracy, Band, UpTo
 from ffr_prep.structures.frame import Member, Shell, check_frame
-from ffr_prep.structures.sections import circle, general, i_section, rectangle, shear_rigid, shifted, tube
+from ffr_prep.structures.sections import box, circle, general, i_section, rectangle, shear_rigid, shifted, tube
 
 LINE = """
 [[polylines]]
@@ -103,6 +103,7 @@ def test_the_example_is_reduced_by_the_command(tmp_path):
     [
         ('{shape = "rectangle", b = 0.02, h = 0.03}', rectangle(0.02, 0.03)),
         ('{shape = "tube", d = 0.02, t = 0.003}', tube(0.02, 0.003)),
+        ('{shape = "box", b = "20 mm", h = 0.03, t = "2 mm"}', box(0.02, 0.03, 0.002)),
         (
             '{shape = "general", A = 1e-4, Iy = 1e-9, Iz = 1e-9, J = 2e-9}',
             general("general", A=1e-4, Iy=1e-9, Iz=1e-9, J=2e-9),

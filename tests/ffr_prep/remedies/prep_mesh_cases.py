@@ -92,6 +92,7 @@ REQUESTS = [
     Case(p(mesh, size=3.0), mesh),
     Case(p(mesh, size=-3.0), mesh),
     Case(p(mesh, order=3), mesh),
+    Case(p(mesh, order=2), mesh),
     Case(p(mesh, numbers={"w": 1.0}), mesh),
     Case(p(mesh, glue=True), mesh),
     Case(p(mesh, most_elements=0.0), mesh),

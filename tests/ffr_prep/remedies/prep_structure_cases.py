@@ -30,6 +30,7 @@ def rail(**changes: float) -> fp.Section:
 BAR = fp.rectangle(0.02, 0.05)
 SECTIONS = [
     Case(p(fp.tube, 0.04, 0.02), p(fp.circle, 0.04)),
+    Case(p(fp.box, 0.08, 0.12, 0.04), p(fp.rectangle, 0.08, 0.12)),
     Case(p(fp.i_section, 0.2, 0.1, 0.1, 0.01), p(fp.rectangle, 0.1, 0.2)),
     Case(p(fp.circle, -0.02), p(fp.circle, 0.02)),
     Case(p(rail, A=0.0), rail),

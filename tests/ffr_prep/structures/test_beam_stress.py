@@ -14,6 +14,7 @@ from ffr_prep.reduction.methods.craig_bampton import CraigBampton
 from ffr_prep.reduction.methods.eigenmodes import Eigenmodes
 from ffr_prep.structures.beam_stress import section_forces_at
 from ffr_prep.structures.sections import (
+    box,
     circle,
     general,
     i_section,
@@ -46,7 +47,9 @@ def moment_at(x, load):
     return load[3:] + np.cross([LENGTH - x, 0.0, 0.0], load[:3])
 
 
-@pytest.mark.parametrize("section", [circle(0.05), rectangle(0.02, 0.06), i_section(0.1, 0.06, 0.005, 0.008)])
+@pytest.mark.parametrize(
+    "section", [circle(0.05), rectangle(0.02, 0.06), i_section(0.1, 0.06, 0.005, 0.008), box(0.06, 0.1, 0.004)]
+)
 @pytest.mark.parametrize("elements", [1, 3])
 def test_section_forces_of_a_cantilever_balance_its_load(section, elements):
     body = reduced(straight(section, LENGTH, elements))
@@ -169,6 +172,81 @@ def test_an_i_section_has_the_shear_of_its_strips():
     np.testing.assert_allclose(von_mises(np.array([0, 300.0, 0, 0, 0, 0]), in_web), along_y, rtol=1e-6)
     along_z = np.sqrt(3) * 1.5 * 300.0 / (2 * b * flange)
     np.testing.assert_allclose(von_mises(np.array([0, 0, 300.0, 0, 0, 0]), on_flange), along_z, rtol=1e-6)
+
+
+def test_a_box_has_the_shear_of_its_cell_and_of_its_webs():
+    """Torque: Bredt's M / 2 A' t, outside more by what walls carry alone; Qy: Q S / (2 I t) in webs; corners have none."""
+    b, h, t = 0.06, 0.1, 0.004
+    section = box(b, h, t)
+    body = reduced(straight(section, LENGTH, 1))
+    y, z = body.surface.points[:, 1:].T
+
+    def at(load, where):
+        return (body.surface.stress @ static(body, "tip", load))[where][:, [0, 3, 4]]
+
+    torque, across = np.array([0, 0, 0, 50.0, 0, 0]), np.array([0, 300.0, 0, 0, 0, 0])
+    web, top = (np.abs(y) < 1e-9) & np.isclose(z, b / 2), (np.abs(z) < 1e-9) & np.isclose(y, h / 2)
+    corner = np.isclose(np.abs(y), h / 2) & np.isclose(np.abs(z), b / 2)
+    assert (web.sum(), top.sum(), corner.sum()) == (5, 5, 40)
+    cell, around = (b - t) * (h - t), 2 * (b + h - 2 * t)
+    outside = 50.0 * (2 * cell / around + t) / section.J
+    assert outside == pytest.approx(50.0 / (2 * cell * t) * (1 + t * around / 2 / cell), rel=0.01)
+    np.testing.assert_allclose(at(torque, web), np.tile([0, -outside, 0], (5, 1)), atol=1e-6 * outside)
+    np.testing.assert_allclose(at(torque, top), np.tile([0, 0, outside], (5, 1)), atol=1e-6 * outside)
+    S = b * t * (h - t) / 2 + t * (h / 2 - t) ** 2
+    np.testing.assert_allclose(at(across, web)[:, 1], 300.0 * S / (section.Iz * 2 * t), rtol=1e-6)
+    np.testing.assert_allclose(at(torque + across, corner)[:, 1:], 0.0, atol=1e-6 * outside)
+
+
+BOX_SOLID = """
+SetFactory("OpenCASCADE");
+Point(1) = {0, -0.06, -0.04}; Point(5) = {0, -0.052, -0.032};
+Point(2) = {0, 0.06, -0.04}; Point(6) = {0, 0.052, -0.032};
+Point(3) = {0, 0.06, 0.04}; Point(7) = {0, 0.052, 0.032};
+Point(4) = {0, -0.06, 0.04}; Point(8) = {0, -0.052, 0.032};
+For k In {1:4}
+  Line(k) = {k, k % 4 + 1}; Line(4 + k) = {4 + k, 4 + k % 4 + 1}; Line(8 + k) = {k, 4 + k};
+EndFor
+For k In {1:4}
+  Curve Loop(k) = {k, 9 + k % 4, -(4 + k), -(8 + k)}; Plane Surface(k) = {k};
+EndFor
+Transfinite Curve{1:8} = 5; Transfinite Curve{9:12} = 2;
+Transfinite Surface{1:4}; Recombine Surface{1:4};
+Extrude {0.6, 0, 0} { Surface{1:4}; Layers{12}; Recombine; }
+Physical Volume("beam") = {1:4};
+Physical Surface("root") = {1:4};
+Physical Surface("tip") = Surface In BoundingBox{0.599, -1, -1, 0.601, 1, 1};
+"""
+
+
+@pytest.mark.slow
+def test_a_box_is_as_stiff_and_as_stressed_as_the_solid(tmp_path):
+    """Every load at the tip; its rigid ends make the solid stiffer by 1 %, and by 5 % with its corners in torsion."""
+    (tmp_path / "beam.geo").write_text(BOX_SOLID)
+    solid = fp.reduce(
+        fp.from_mesh(fp.read_mesh(tmp_path / "beam.geo"), STEEL, regions("root", "tip")),
+        fp.Request(name="solid", reference=FixedTo("root"), reduction=CraigBampton(0), stress=True, linear=True),
+    )
+    beam = reduced(straight(box(0.08, 0.12, 0.008), 0.6, 2))
+    assert solid.mass == pytest.approx(beam.mass, rel=1e-9)
+    for k, load in enumerate(np.eye(6)):
+        moves, stress = [], []
+        for body in (solid, beam):
+            tip, q = body.interface("tip"), static(body, "tip", load)
+            moves.append((np.vstack([tip.phi_t, tip.phi_r]) @ q)[k])
+            stress.append(middles_of_walls(body, q))
+        assert moves[0] == pytest.approx(moves[1], rel=0.06 if k == 3 else 0.02)
+        assert moves[0] < moves[1]
+        largest = np.abs(beam.surface.stress @ static(beam, "tip", load)).max()
+        np.testing.assert_allclose(stress[0], stress[1], atol=0.02 * largest)
+
+
+def middles_of_walls(body, q):
+    """(4, 6) the stress halfway along, in the middle of the outside of the walls."""
+    wanted = np.array([(0.3, 0, 0.04), (0.3, 0, -0.04), (0.3, 0.06, 0), (0.3, -0.06, 0)])
+    distance = np.linalg.norm(body.surface.points - wanted[:, None], axis=2)
+    assert distance.min(axis=1).max() < 1e-9
+    return (body.surface.stress @ q)[distance.argmin(axis=1)]
 
 
 def test_shear_in_a_thick_tube_balances_its_force():

@@ -45,6 +45,7 @@ from ffr_prep.structures.frame import (
 from ffr_prep.structures.interfaces import couple_frame, tie
 from ffr_prep.structures.model import assemble_frame, from_frame
 from ffr_prep.structures.sections import (
+    box,
     circle,
     general,
     i_section,
@@ -604,7 +605,11 @@ def test_closed_polyline():
     check_frame(ring)
 
 
-@pytest.mark.parametrize("section", [rectangle(0.02, 0.05), i_section(0.05, 0.04, 0.004, 0.006)], ids=["box", "I"])
+@pytest.mark.parametrize(
+    "section",
+    [rectangle(0.02, 0.05), i_section(0.05, 0.04, 0.004, 0.006), box(0.03, 0.05, 0.004)],
+    ids=["rectangle", "I", "box"],
+)
 def test_drawn_surface_encloses_the_beam(section):
     """The triangles look outward and enclose A L; a rigid shift in the basis would show in every point alike."""
     body = fp.reduce(
