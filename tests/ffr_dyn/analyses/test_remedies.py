@@ -556,6 +556,10 @@ INPUT = [
     Case(p(linearise, DRIVEN), p(linearise, HINGED)),
     Case(p(linearise, HINGED, inputs=("push",)), p(linearise, pushed(1.0), inputs=("push",))),
     Case(
+        p(linearise, pushed(0.0), inputs=("push",)),
+        lambda: linearise(pushed(0.0), inputs=(fd.MarkerEffort("more", "bar.b", (1, 0, 0)),)),
+    ),
+    Case(
         lambda: linearise(felt(lambda t, s: (0, 0, 0)), inputs=("gust",)),
         p(linearise, HINGED, inputs=(fd.JointEffort("motor", "hinge"),)),
     ),
