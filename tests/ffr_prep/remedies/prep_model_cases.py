@@ -69,6 +69,7 @@ MATERIALS = [
     Case(p(parse_material, "E=2e11,E=2e11,nu=0.3"), p(parse_material, "E=2e11,nu=0.3,rho=7850")),
     Case(p(parse_material, "E=x,nu=0.3,rho=1e3"), p(parse_material, "E=2e11,nu=0.3,rho=1e3")),
     edited(lambda path: parse_material(str(path)), "material.toml", ("E1 = 1.4e11", 'E1 = "stiff"')),
+    edited(lambda path: parse_material(str(path)), "material.toml", ("E1 = 1.4e11", "E1 = [1.4e11]")),
 ]
 
 # ---- interfaces, conditions, cuts ------------------------------------------------------------------------------------
