@@ -39,26 +39,27 @@ def nodes_on_edges(points: Array, elements: Sequence[Array]) -> Array:
 
 def nodes_on_faces(points: Array, triangles: Array, nodes: Array) -> Array:
     """(m,) those of the nodes that lie in triangles (T, 3) without being a corner of them."""
-    found = [np.zeros(0, np.int64)]
-    if not len(triangles):
-        return found[0]
     corners = points[triangles]
     centres = corners.mean(axis=1)
     radii = np.linalg.norm(corners - centres[:, None], axis=2).max(axis=1)
-    tree = cKDTree(points[nodes])
-    for triangle, here in enumerate(tree.query_ball_point(centres, radii)):
-        inside = np.setdiff1d(nodes[here], triangles[triangle])
-        found.append(inside[_inside(corners[triangle], points[inside])])
-    return np.unique(np.concatenate(found))
+    near = cKDTree(points[nodes]).query_ball_point(centres, radii)
+    triangle = np.repeat(np.arange(len(near)), [len(of) for of in near])
+    node = nodes[np.array([k for of in near for k in of], np.int64)]
+    strange = (node[:, None] != triangles[triangle]).all(axis=1)
+    triangle, node = triangle[strange], node[strange]
+    return np.unique(node[_inside(corners[triangle], points[node])])
 
 
 def _inside(corners: Array, places: Array) -> Array:
-    """(P,) whether places lie in the triangle of corners (3, 3)."""
-    sides = (corners[1:] - corners[0]).T
-    shares = np.linalg.lstsq(sides, (places - corners[0]).T, rcond=None)[0]
-    off = np.linalg.norm(places - corners[0] - (sides @ shares).T, axis=1)
-    size = np.linalg.norm(sides, axis=0).max()
-    return np.asarray((off <= _ON * size) & (shares >= -_ON).all(axis=0) & (shares.sum(axis=0) <= 1 + _ON))
+    """(P,) whether places (P, 3) lie each in its triangle of corners (P, 3, 3)."""
+    sides, away = corners[:, 1:] - corners[:, :1], places - corners[:, 0]
+    products, along = np.einsum("pic,pjc->pij", sides, sides), np.einsum("pic,pc->pi", sides, away)
+    area = np.maximum(products[:, 0, 0] * products[:, 1, 1] - products[:, 0, 1] ** 2, np.finfo(float).tiny)
+    first = (products[:, 1, 1] * along[:, 0] - products[:, 0, 1] * along[:, 1]) / area
+    second = (products[:, 0, 0] * along[:, 1] - products[:, 0, 1] * along[:, 0]) / area
+    off = np.linalg.norm(away - first[:, None] * sides[:, 0] - second[:, None] * sides[:, 1], axis=1)
+    size = np.sqrt(np.maximum(products[:, 0, 0], products[:, 1, 1]))
+    return np.asarray((off <= _ON * size) & (first >= -_ON) & (second >= -_ON) & (first + second <= 1 + _ON))
 
 
 def _edges(elements: Sequence[Array], count: int) -> tuple[Array, Array]:
