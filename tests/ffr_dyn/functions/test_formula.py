@@ -88,6 +88,12 @@ def test_a_ramp_reaches_its_speed_and_goes_no_faster():
     assert evaluate(function, 1.0) == pytest.approx((3 * (1.0 - 0.25), 3.0, 0.0))
 
 
+def test_time_times_a_smooth_step_overshoots_its_speed_as_the_page_says():
+    product = formula("t * smooth(t / 0.5)")
+    rates = [evaluate(product, t)[1] for t in np.linspace(0, 0.5, 301)]
+    assert max(rates) == pytest.approx(16 / 9, rel=1e-9)
+
+
 def test_powers_have_derivatives_at_zero():
     assert evaluate(formula("t ** 2"), 0.0) == (0.0, 0.0, 2.0)
     assert evaluate(formula("t ** 1"), 0.0) == (0.0, 1.0, 0.0)
