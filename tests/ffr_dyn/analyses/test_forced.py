@@ -93,6 +93,7 @@ def test_the_backbone_is_that_of_the_free_oscillator(swept):
     assert f == pytest.approx(exact, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_upwards_and_downwards_jump_where_one_harmonic_says(swept):
     """(K - M w^2 + 3/4 CUBIC a^2)^2 + (DAMPING w)^2 = (F / a)^2 has its vertical tangents there, within a per cent."""
 
