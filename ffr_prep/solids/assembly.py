@@ -25,7 +25,7 @@ from ffr_prep.common.errors import InputError
 from ffr_prep.mesh.mesh import Mesh
 from ffr_prep.mesh.shapes import determinants, local_order, mapping, scalar_basis
 from ffr_prep.model.material import AnisotropicMaterial, Material, Solid
-from ffr_prep.solvers.threads import ahead
+from ffr_prep.solvers.threads import ahead, finish, pieces, threads
 
 check_compiled_code()
 
@@ -53,14 +53,11 @@ def assemble(mesh: Mesh, material: Materials) -> SolidMatrices:
     Raises InputError for an element without a material or with two, and for an element turned inside out.
     """
     pattern = _pattern(mesh)
-    K, m = np.zeros((3, 3, pattern.nnz)), np.zeros(pattern.nnz)
+    K, m = np.zeros((6, pattern.nnz)), np.zeros(pattern.nnz)
     for places, mass, stiffness in ahead(partial(_of_chunk, mesh.points, pattern), chunks(mesh, material)):
-        np.add.at(m, places, mass)
-        for i, j, of_block in zip(*np.tril_indices(3), stiffness, strict=True):
-            np.add.at(K[i, j], places, of_block)
-    mirrored = pattern.T.tocsr().data
-    for i, j in zip(*np.tril_indices(3, -1), strict=True):
-        K[j, i] = K[i, j, mirrored]
+        _add(m, places, mass)
+        for block, of_block in zip(K, stiffness, strict=True):
+            _add(block, places, of_block)
     return SolidMatrices(
         _from_blocks(pattern, K), sp.csr_array((m, pattern.indices, pattern.indptr), shape=pattern.shape)
     )
@@ -125,9 +122,40 @@ def _pattern(mesh: Mesh) -> sp.csr_array:
 
 
 def _from_blocks(pattern: sp.csr_array, K: Array) -> sp.csr_array:
-    blocks = np.ascontiguousarray(K.transpose(2, 0, 1))
-    shape = (3 * pattern.shape[0], 3 * pattern.shape[1])
-    return sp.csr_array(sp.bsr_array((blocks, pattern.indices, pattern.indptr), shape=shape).tocsr())
+    """(3N, 3N) symmetric matrix of the blocks K_ij, i >= j, of pairs of nodes (6, p), which the pattern (N, N) has."""
+    width, count, mirrored = 3 * pattern.shape[0], 9 * pattern.nnz, pattern.T.tocsr().data
+    of_node = np.diff(pattern.indptr).astype(np.int64)
+    ends = np.concatenate([[0], np.cumsum(np.repeat(3 * of_node, 3))]).astype(
+        sp.get_index_dtype(maxval=max(count, width))
+    )
+    columns, values = np.empty(count, ends.dtype), np.empty(count)
+
+    def fill(nodes: slice) -> None:
+        _fill(pattern.indptr, pattern.indices, K, mirrored, ends, columns, values, nodes.start, nodes.stop)
+
+    with threads() as each:
+        finish(each(fill, pieces(pattern.shape[0])))
+    return sp.csr_array((values, columns, ends), shape=(width, width))
+
+
+@numba.njit(cache=True, nogil=True)
+def _fill(indptr, indices, K, mirrored, ends, columns, values, first, last):  # type: ignore[no-untyped-def]
+    """The rows of the nodes first...last; mirrored (p,) : the number of each pair the other way round."""
+    for node in range(first, last):
+        for i in range(3):
+            at = ends[3 * node + i]
+            for p in range(indptr[node], indptr[node + 1]):
+                for j in range(3):
+                    columns[at] = 3 * indices[p] + j
+                    values[at] = K[i * (i + 1) // 2 + j, p] if i >= j else K[j * (j + 1) // 2 + i, mirrored[p]]
+                    at += 1
+
+
+@numba.njit(cache=True, nogil=True)
+def _add(into, places, values):  # type: ignore[no-untyped-def]
+    """into[places] += values, one after the other."""
+    for k in range(places.size):
+        into[places[k]] += values[k]
 
 
 # ---- elements -----------------------------------------------------------------------------------------------------

@@ -50,7 +50,7 @@ from ffr_prep.solvers.threads import Map, finish, pieces, threads
 _BRANCHES = 24  # a branch has at most this part of the work
 Made = TypeVar("Made")
 
-_TILE = 384
+_TILE = 384  # columns or rows: whole strips
 LESS = (
     "take a coarser mesh, cut the body into parts, or reduce it where there is more memory, on several machines with the "
     "solver slepc"
@@ -278,7 +278,7 @@ def _eliminate_all(fronts: Fronts, division: Division, matrix: Sorted, each: Map
         for child in division.below[k]:
             add_tiled(fronts, child, updates.pop(child), panel, update, space.local, each)
         _eliminate_tiled(fronts, k, panel, update, each)
-        updates[k] = packed(update)
+        updates[k] = packed(update, each)
         elimination.add(k, k)
 
 
@@ -343,10 +343,10 @@ def begun(fronts: Fronts, k: int, matrix: Sorted, space: Workspace) -> tuple[Arr
     return panel, update
 
 
-def packed(update: Array) -> Array:
+def packed(update: Array, each: Map) -> Array:
     """The lower triangle of an update."""
     lower = np.empty(triangle(len(update)))
-    pack(update, lower)
+    finish(each(lambda columns: pack(update, lower, *columns), tiles(0, len(update))))
     return lower
 
 
@@ -372,7 +372,7 @@ def _eliminate_tiled(fronts: Fronts, k: int, front: Array, update: Array, each: 
         finish(each(lambda rows, of=(first, last): row_tile(panel, size, *of, *rows), tiles(last, size)))
     pairs = [(columns, rows) for columns in tiles(0, rest) for rows in tiles(0, rest) if rows >= columns]
     finish(each(lambda pair: update_tile(panel, own, update, *pair[0], *pair[1]), pairs))
-    keep(fronts, k, front)
+    finish(each(lambda columns: keep(fronts, k, front, *columns), tiles(0, own)))
 
 
 def tiles(start: int, stop: int) -> list[tuple[int, int]]:

@@ -125,7 +125,7 @@ def _count_tiled(
         finish(each(lambda rows: _divided(panel, pivots, d, e, scaled, *rows), tiles(0, rest)))
         pairs = [(columns, rows) for columns in tiles(0, rest) for rows in tiles(0, rest) if rows >= columns]
         finish(each(lambda pair: _update_tile(panel, scaled, update, *pair[0], *pair[1]), pairs))
-    return packed(update), count
+    return packed(update, each), count
 
 
 # ---- compiled -----------------------------------------------------------------------------------------------------
@@ -150,7 +150,7 @@ def _count_branch(fronts, first, last, A, space):  # type: ignore[no-untyped-def
             break
         total += count
         height = pushed(fronts, k, pending, places, height)
-        pack(update, waiting[places[height - 1] : places[height]])
+        pack(update, waiting[places[height - 1] : places[height]], 0, len(update))
     return waiting[: places[height]].copy(), total
 
 

@@ -205,13 +205,15 @@ def tall(fronts, k):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True)
-def keep(fronts, k, panel):  # type: ignore[no-untyped-def]
-    """The panel (own, own + rest) of a front that is eliminated, as strips into the factor."""
-    size, at = tall(fronts, k), fronts.offsets[k]
-    for c in range(panel.shape[0]):
-        first = c - c % STRIP
-        fronts.panels[at : at + size - first] = panel[c, first:size]
-        at += size - first
+def keep(fronts, k, panel, first, last):  # type: ignore[no-untyped-def]
+    """Columns first...last of the panel (own, own + rest) of a front that is eliminated, as strips into the factor; the first
+    begins a strip."""
+    size, strips = tall(fronts, k), first // STRIP
+    at = fronts.offsets[k] + STRIP * (strips * size - STRIP * (strips * (strips - 1) // 2))
+    for c in range(first, min(last, panel.shape[0])):
+        top = c - c % STRIP
+        fronts.panels[at : at + size - top] = panel[c, top:size]
+        at += size - top
 
 
 @numba.njit(cache=True, nogil=True)
@@ -221,11 +223,12 @@ def triangle(rest):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True)
-def pack(update, triangle):  # type: ignore[no-untyped-def]
-    """The lower triangle of an update (rest, rest) into an array."""
-    at, rest = 0, update.shape[0]
-    for j in range(rest):
-        triangle[at : at + rest - j] = update[j, j:]
+def pack(update, lower, first, last):  # type: ignore[no-untyped-def]
+    """Columns first...last of the lower triangle of an update (rest, rest), into an array that has all of it."""
+    rest = update.shape[0]
+    at = first * rest - triangle(first - 1)
+    for j in range(first, min(last, rest)):
+        lower[at : at + rest - j] = update[j, j:]
         at += rest - j
 
 
@@ -275,7 +278,7 @@ def eliminate(fronts, k, panel, update):  # type: ignore[no-untyped-def]
     if rest:
         divide(RIGHT, True, flat, flat[own:], rest, own, size, size)
         minus_square(flat[own:], update, rest, own, size, rest)
-    keep(fronts, k, panel)
+    keep(fronts, k, panel, 0, own)
     return DONE
 
 
@@ -296,7 +299,7 @@ def eliminate_branch(fronts, first, last, A, space):  # type: ignore[no-untyped-
         if bad != DONE:
             break
         height = pushed(fronts, k, pending, places, height)
-        pack(update, waiting[places[height - 1] : places[height]])
+        pack(update, waiting[places[height - 1] : places[height]], 0, len(update))
     return waiting[: places[height]].copy(), bad
 
 
