@@ -14,7 +14,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ffr_prep.body import content_hash
-from ffr_prep.common.arrays import Array
+from ffr_prep.common.arrays import Array, distinct
 from ffr_prep.common.brief import Brief, Rows, listed
 from ffr_prep.common.errors import InputError
 from ffr_prep.common.in_words import extent_in_words
@@ -209,7 +209,7 @@ def _check_places(path: Path, read: FileMesh) -> None:
 
 def _in_metres(read: FileMesh, unit: str) -> Mesh:
     """The mesh without the nodes that no element uses, its faces completed from the volume elements."""
-    used = np.unique(np.concatenate([nodes.ravel() for _, nodes in read.blocks]))
+    used = distinct(np.concatenate([nodes.ravel() for _, nodes in read.blocks]))
     new = np.full(len(read.points), -1)
     new[used] = np.arange(used.size)
     blocks = [(kind, new[nodes]) for kind, nodes in read.blocks]
@@ -365,10 +365,10 @@ def _check_numbers(mesh: Mesh) -> None:
     wrong = np.flatnonzero(~np.isfinite(mesh.points).all(axis=1))
     if wrong.size:
         raise InputError(f"node {wrong[0]} has the coordinates {mesh.points[wrong[0]]}; they must be finite numbers")
-    used = np.unique(np.concatenate([block.nodes.ravel() for block in mesh.blocks]))
+    used = distinct(np.concatenate([block.nodes.ravel() for block in mesh.blocks]))
     if used[0] < 0 or used[-1] >= len(mesh.points):
         raise InputError(f"elements refer to nodes {used[0]} to {used[-1]}, but there are {len(mesh.points)} nodes")
-    unused = np.setdiff1d(np.arange(len(mesh.points)), used)
+    unused = np.delete(np.arange(len(mesh.points)), used)
     if unused.size:
         raise InputError(f"{unused.size} nodes belong to no element, the first being node {unused[0]}; remove them")
 

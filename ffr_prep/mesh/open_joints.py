@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ffr_prep.common.arrays import Array
+from ffr_prep.common.arrays import Array, among, distinct
 
 _ON = 1e-4  # of the length of an edge: within which a node lies on it
 _FEW = 64  # nodes in a ball that are looked at one by one
@@ -23,7 +23,7 @@ def nodes_on_edges(points: Array, elements: Sequence[Array]) -> Array:
     """(m,) nodes that lie on an edge of beams or faces (E, k), which have k = 2, 3, 4, 6, 8 or 9 nodes, corners in turn
     first, and belong to none that has this edge."""
     edges, own = _edges(elements, len(points))
-    nodes = np.unique(np.concatenate([of.ravel() for of in elements]))
+    nodes = distinct(np.concatenate([of.ravel() for of in elements]))
     tree = cKDTree(points[nodes])
     found = [np.zeros(0, np.int64)]
     for edge, k in _near(tree, points[edges]):
@@ -32,7 +32,7 @@ def nodes_on_edges(points: Array, elements: Sequence[Array]) -> Array:
         length = np.linalg.norm(b - a, axis=1)
         share = np.einsum("pc,pc->p", points[node] - a, b - a) / np.maximum(length, np.finfo(float).tiny) ** 2
         off = np.linalg.norm(points[node] - a - np.clip(share, 0, 1)[:, None] * (b - a), axis=1)
-        on = (off <= _ON * length) & ~np.isin(edge * len(points) + node, own)
+        on = (off <= _ON * length) & ~among(edge * len(points) + node, own)
         found.append(node[on])
     return np.unique(np.concatenate(found))
 
@@ -72,7 +72,7 @@ def _edges(elements: Sequence[Array], count: int) -> tuple[Array, Array]:
         which.ravel()[start : start + len(pairs), None] * count + np.repeat(of, len(pairs) // max(len(of), 1), axis=0)
         for start, pairs, of in zip(starts, ends, elements, strict=False)
     ]
-    return edges, np.unique(np.concatenate([of.ravel() for of in own]))
+    return edges, distinct(np.concatenate([of.ravel() for of in own]))
 
 
 def _near(tree: cKDTree, ends: Array) -> Iterator[tuple[Array, Array]]:

@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 import scipy.sparse as sp
 
-from ffr_prep.common.arrays import Array
+from ffr_prep.common.arrays import Array, distinct
 from ffr_prep.mesh.cells import KINDS
 from ffr_prep.mesh.mesh import Mesh
 from ffr_prep.model.coupled import CoupledModel
@@ -24,7 +24,7 @@ def element_edges(mesh: Mesh) -> Array:
     """(E, 2) the corners at the ends of the edges of all elements of a mesh."""
     count = len(mesh.points)
     ends = np.concatenate([block.nodes[:, _edges(block.kind)].reshape(-1, 2) for block in mesh.blocks])
-    each = np.unique(ends.min(axis=1).astype(np.int64) * count + ends.max(axis=1))
+    each = distinct(ends.min(axis=1).astype(np.int64) * count + ends.max(axis=1))
     return np.stack([each // count, each % count], axis=1)
 
 

@@ -19,6 +19,7 @@ from ffr_prep.model.coupled import CoupledModel, InterfaceRegion, check_independ
 from ffr_prep.model.region_rotations import MeanRegion, RigidRegion, force_moments
 from ffr_prep.model.ties import check_names, interface_coordinates, six_rows, tied_rows
 from ffr_prep.solids.assembly import SolidMatrices, vector_mass
+from ffr_prep.solvers.threads import finish, pieces, threads
 
 check_compiled_code()
 
@@ -65,34 +66,47 @@ def _tied(A: sp.csr_array, B: sp.csr_array, free: Array) -> sp.csr_array:
         product.sort_indices()  # products of matrices leave neither, and bits depend on the order of sums
     new = np.full(A.shape[0], -1, A.indices.dtype)
     new[free] = np.arange(free.size)
-    data, indices, ends = _beside(
-        A.indptr, A.indices, A.data, free, new, across.indptr, across.indices, across.data, last.nnz
-    )
-    data[ends[-1] :], indices[ends[-1] :] = last.data, last.indices
-    ends = np.concatenate([ends, ends[-1] + last.indptr[1:]]).astype(A.indptr.dtype)
+    counts, rows = np.empty(free.size, np.int64), pieces(free.size)
+
+    def count(some: slice) -> None:
+        _count(A.indptr, A.indices, A.data, free[some], new, counts[some])
+
+    def fill(some: slice) -> None:
+        beside = across.indptr, across.indices, across.data
+        _beside(A.indptr, A.indices, A.data, free, new, *beside, ends, data, indices, some.start, some.stop)
+
+    with threads() as each:
+        finish(each(count, rows))
+        inner = np.concatenate([[0], np.cumsum(counts + np.diff(across.indptr))])
+        ends = np.concatenate([inner, inner[-1] + last.indptr[1:]]).astype(A.indptr.dtype)
+        data, indices = np.empty(ends[-1]), np.empty(ends[-1], A.indices.dtype)
+        finish(each(fill, rows))
+    data[inner[-1] :], indices[inner[-1] :] = last.data, last.indices
     return sp.csr_array((data, indices, ends), shape=(ends.size - 1, ends.size - 1))
 
 
-@numba.njit(cache=True)
-def _beside(indptr, indices, data, free, new, ends, columns, values, room):  # type: ignore[no-untyped-def]
-    """Numbers, columns and ends of the free rows of a matrix: those of free columns under their new numbers, and then those
-    of another matrix (ends, columns, values) whose columns follow; without zeros, with room for more."""
-    count, made = 0, np.zeros(free.size + 1, np.int64)
-    for i in free:
-        for e in range(indptr[i], indptr[i + 1]):
-            count += new[indices[e]] >= 0 and data[e] != 0
-    numbers, places = np.empty(count + values.size + room), np.empty(count + values.size + room, indices.dtype)
-    at = 0
-    for k in range(free.size):
+@numba.njit(cache=True, nogil=True)
+def _count(indptr, indices, data, rows, new, counts):  # type: ignore[no-untyped-def]
+    """How many entries of some rows of a matrix are in free columns and no zeros."""
+    for k in range(rows.size):
+        counts[k] = 0
+        for e in range(indptr[rows[k]], indptr[rows[k] + 1]):
+            counts[k] += new[indices[e]] >= 0 and data[e] != 0
+
+
+@numba.njit(cache=True, nogil=True)
+def _beside(indptr, indices, data, free, new, across, columns, values, ends, numbers, places, first, last):  # type: ignore[no-untyped-def]
+    """Numbers and columns of the free rows first...last of a matrix: those of free columns under their new numbers, without
+    zeros, and then those of another matrix (across, columns, values) whose columns follow."""
+    for k in range(first, last):
+        at = ends[k]
         for e in range(indptr[free[k]], indptr[free[k] + 1]):
             if new[indices[e]] >= 0 and data[e] != 0:
                 numbers[at], places[at] = data[e], new[indices[e]]
                 at += 1
-        for e in range(ends[k], ends[k + 1]):
+        for e in range(across[k], across[k + 1]):
             numbers[at], places[at] = values[e], free.size + columns[e]
             at += 1
-        made[k + 1] = at
-    return numbers, places, made
 
 
 def turning_regions(

@@ -32,8 +32,8 @@ from ffr_prep.solids.assembly import (
     SolidMatrices,
     chunks,
     displacement_gradients,
-    vector_mass,
 )
+from ffr_prep.solvers.threads import product
 
 
 def stiffening_of(mesh: Mesh, material: Materials, static: Array, Phi: Array) -> Array:
@@ -78,4 +78,6 @@ def _forces_of_chunk(points: Array, chunk: Chunk, Phi: Array, some: range) -> tu
 
 def inertial_loads(points: Array, matrices: SolidMatrices) -> Array:
     """(3N, 12) nodal forces of unit accelerations: translation, rotation, products of the angular velocity."""
-    return np.asarray(-(vector_mass(matrices.m) @ unit_accelerations(points).reshape(12, -1).T))
+    fields = unit_accelerations(points).transpose(1, 0, 2).reshape(len(points), -1)
+    momenta = product(matrices.m, fields).reshape(len(points), 12, 3)
+    return np.asarray(-momenta.transpose(0, 2, 1).reshape(-1, 12))

@@ -38,9 +38,9 @@ def elimination_tree(A: sp.csr_array, positions: Array, held: Array = NOTHING) -
     free = np.ones(len(positions), bool)
     free[held] = False
     placed = np.flatnonzero(np.isfinite(positions[:, 0]) & free)
-    points, index = np.unique(positions[placed], axis=0, return_inverse=True)
+    points, index = _distinct(positions[placed])
     point_of = np.full(len(positions), -1)
-    point_of[placed] = index.ravel()
+    point_of[placed] = index
     by_point = np.argsort(point_of, kind="stable")[len(positions) - placed.size :]
     ends = np.searchsorted(point_of[by_point], np.arange(len(points) + 1))
     pieces, children = _dissection(points, _graph(A, point_of, by_point, ends))
@@ -51,6 +51,16 @@ def elimination_tree(A: sp.csr_array, positions: Array, held: Array = NOTHING) -
         children.append(_tops(children))
         unknowns.append(last)
     return unknowns, children
+
+
+def _distinct(positions: Array) -> tuple[Array, Array]:
+    """The points (N, 3) of positions (n, 3), each once in the order of their coordinates, and the number of each position."""
+    order = np.lexsort(positions.T[::-1])  # a third of the time of sorting rows
+    ascending = positions[order]
+    new = np.append(np.ones(min(len(order), 1), bool), (np.diff(ascending, axis=0) != 0).any(axis=1))
+    index = np.empty(len(order), int)
+    index[order] = np.cumsum(new) - 1
+    return ascending[new], index
 
 
 def _graph(A: sp.csr_array, point_of: Array, by_point: Array, ends: Array) -> sp.csr_array:
