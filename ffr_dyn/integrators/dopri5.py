@@ -1,6 +1,7 @@
 """The explicit Runge-Kutta pair of orders 5 and 4 of Dormand & Prince (1980), on the index-1 equations.
 
-Seven stages, the last of which is the first of the next step. Coefficients: Hairer, Norsett & Wanner 1993, table II.5.2.
+Seven stages, the last of which is the first of the next step. Within a step positions and velocities each follow a polynomial
+of order four through all stages. Coefficients: Hairer, Norsett & Wanner 1993, table II.5.2 and section II.6.
 
 Twin: the statement above, held by
 `tests/ffr_dyn/integrators/test_integrators_adaptive.py::test_the_error_follows_the_tolerance`.
@@ -13,8 +14,11 @@ from typing import ClassVar
 
 from ffr_dyn.integrators.tolerances import Tolerances
 from ffr_dyn.kernels.integrator_api import (
+    BEFORE,
+    NOW,
     OK,
     RESTART,
+    WITHIN,
     CompiledFunction,
     H,
     Tables,
@@ -25,6 +29,7 @@ from ffr_dyn.kernels.integrator_api import (
     fill,
     finite,
     inlined,
+    kernel,
     method_step,
     normalise,
     position_rates,
@@ -46,6 +51,11 @@ STAGES = (
 )
 # Less the weights of order four.
 ERRORS = (71 / 57600, 0.0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40)
+# Of the part of order four of the polynomial within a step.
+BENT = (
+    *(-12715105075 / 11282082432, 0.0, 87487479700 / 32700410799, -10690763975 / 1880347072),
+    *(701980252875 / 199316789632, -1453857185 / 822651844, 69997945 / 29380423),
+)
 AT = (0.0, 1 / 5, 3 / 10, 4 / 5, 8 / 9, 1.0, 1.0)
 FIRST = 3  # row of the first stage; before it the error and scratch
 
@@ -59,9 +69,38 @@ def slopes(r, x, v, k):
     velocity_rates(r, r.stages.v[FIRST + k])
 
 
+@kernel
+def state_within(first, stages, h, share, last):
+    """In place of the state `last`, with which a step of length h ends that began at `first`: that at a share of it."""
+    rest = 1.0 - share
+    for k in range(last.size):
+        whole, bent = last[k] - first[k], 0.0
+        for j in range(7):
+            bent += h * BENT[j] * stages[FIRST + j, k]
+        begins = h * stages[FIRST, k] - whole
+        ends = whole - h * stages[FIRST + 6, k] - begins
+        last[k] = first[k] + share * (whole + rest * (begins + share * (ends + rest * bent)))
+
+
+@inlined
+def go_back(r, t):
+    """The engine's state at a time t within the last step."""
+    c = r.control
+    now, h = c.numbers[NOW], c.numbers[NOW] - c.numbers[BEFORE]
+    if t < now and h > 0.0:
+        share = (t - c.numbers[BEFORE]) / h
+        state_within(c.x, r.stages.x, h, share, r.x)
+        state_within(c.v, r.stages.v, h, share, r.v)
+        normalise(r.model.bodies, r.x)
+
+
 @method_step
 def dopri5_step(r: Tables, t: float, again: int) -> int:
-    """One step of the engine's state from time t; `again` tells that the last one was refused. Returns a status."""
+    """One step of the engine's state from time t; `again` tells that the last one was refused, or asks for the state at t
+    within it. Returns a status."""
+    if again == WITHIN:
+        go_back(r, t)
+        return OK
     h, stages = r.clock.time[H], r.stages
     set_diagonal(r, 0.0)
     if stages.numbers[0] == 0.0 or again == RESTART:

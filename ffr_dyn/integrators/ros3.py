@@ -35,6 +35,7 @@ from ffr_dyn.kernels.integrator_api import (
     IN_V,
     IN_X,
     OK,
+    WITHIN,
     CompiledFunction,
     H,
     N,
@@ -51,6 +52,7 @@ from ffr_dyn.kernels.integrator_api import (
     fill,
     finite,
     inlined,
+    interpolate,
     later_stage,
     method_step,
     normalise,
@@ -112,7 +114,10 @@ def _compare_end(r, t, h):
 
 @method_step
 def ros3_step(r: Tables, t: float, again: int) -> int:
-    """One step of the engine's state from time t. Returns a status."""
+    """One step of the engine's state from time t, or with `again` WITHIN its state then. Returns a status."""
+    if again == WITHIN:
+        interpolate(r, t)
+        return OK
     h = r.clock.time[H]
     bodies, stages = r.model.bodies, r.stages
     gh = GAMMA * h

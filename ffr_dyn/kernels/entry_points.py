@@ -27,7 +27,6 @@ from ffr_dyn.kernels.solution import (
     solve_back,
 )
 from ffr_dyn.kernels.step_control import (
-    interpolate,
     look_anywhere,
     look_at_row,
     step_in_pieces,
@@ -80,6 +79,7 @@ from ffr_dyn.kernels.tables import (
     TOLERANCE,
     UP_TO,
     USER_FAILED,
+    WITHIN,
     Model,
     N,
     Record,
@@ -494,7 +494,8 @@ def record_state(r: Tables, t: float, out: Record, row: int) -> int:
 def step(r: Tables, t: float, again: int) -> int:
     """One step of the engine's state from time t, by the method of the engine: its own function stands in this place.
 
-    again : 1 where the last step, from the same time, was refused; RESTART
+    again : 1 where the last step, from the same time, was refused; RESTART; WITHIN, of a method that chooses its steps: the
+            state at time t, within the last step
     """
     return OK
 
@@ -590,7 +591,7 @@ def run_controlled(r: Tables, start: float, out: Record) -> int:
                 return status
         copy(c.held_x, r.x)
         copy(c.held_v, r.v)
-        interpolate(r, t)
+        step(r, t, WITHIN)
         position, velocity = r.work.drift[PHI], r.work.drift[PHI_DOT]  # of the steps, not of the rows between them
         look_at_row(r, find_break, t)
         status = stabilise(r, t, r.x, r.v)

@@ -64,6 +64,7 @@ from ffr_dyn.kernels.options import inlined, kernel
 from ffr_dyn.kernels.simd.entry_point import CompiledFunction
 from ffr_dyn.kernels.simd.slices import part
 from ffr_dyn.kernels.solution import add_reactions, constraint_rates
+from ffr_dyn.kernels.step_control import interpolate
 from ffr_dyn.kernels.system import (
     acceleration_target,
     finite,
@@ -75,6 +76,7 @@ from ffr_dyn.kernels.system import (
 )
 from ffr_dyn.kernels.tables import (
     AHEAD,
+    BEFORE,
     BY_PLACE,
     BY_RATE,
     BY_TIME,
@@ -88,6 +90,7 @@ from ffr_dyn.kernels.tables import (
     NORMAL,
     NOT_CONVERGED,
     NOT_FINITE,
+    NOW,
     OK,
     PHI,
     PHI_DOT,
@@ -95,6 +98,7 @@ from ffr_dyn.kernels.tables import (
     TIGHTER,
     TOLERANCE,
     USER_FAILED,
+    WITHIN,
     H,
     N,
     Tables,
@@ -119,6 +123,7 @@ from ffr_dyn.kernels.vectors import (
 )
 
 __all__ = [
+    "BEFORE",
     "FAILED",
     "HERE",
     "IN_SHARED",
@@ -128,6 +133,7 @@ __all__ = [
     "NORMAL",
     "NOT_CONVERGED",
     "NOT_FINITE",
+    "NOW",
     "OK",
     "PHI",
     "PHI_DOT",
@@ -135,6 +141,7 @@ __all__ = [
     "TIGHTER",
     "TOLERANCE",
     "USER_FAILED",
+    "WITHIN",
     "CompiledFunction",
     "H",
     "N",
@@ -162,6 +169,7 @@ __all__ = [
     "finite",
     "get",
     "inlined",
+    "interpolate",
     "into_body_axes",
     "into_global_axes",
     "keep_measured",

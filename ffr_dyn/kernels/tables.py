@@ -153,9 +153,9 @@ class Pattern(NamedTuple):
 
 # Of a break of functions of time [s]: the last time before it, the first behind it, and that at which a row there looks.
 UNTIL, SINCE, SEEN = range(3)
-RESTART = (
-    2  # of a step (`again`): functions of time break nearby, what the method keeps from earlier steps is worth nothing
-)
+# Of a step (`again`): functions of time break nearby, what the method keeps from earlier steps is worth nothing; or no step,
+# but the state at a time within the last one.
+RESTART, WITHIN = 2, 3
 
 
 class Functions(NamedTuple):

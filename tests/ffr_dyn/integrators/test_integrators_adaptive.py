@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 from synthetic import cloud
 from test_analyses_references import END, andrews
 
@@ -66,6 +67,26 @@ def test_rows_between_the_steps_are_as_good_as_the_steps(kind, reference):
     assert apart(run, fine) < 2e-6
     assert np.abs(run["bar.q_dot"] - fine["bar.q_dot"]).max() < 3e-3 * np.abs(fine["bar.q_dot"]).max()
     assert np.abs(run["bar.omega_bar"] - fine["bar.omega_bar"]).max() < 1e-4
+
+
+def test_rows_of_dormand_prince_are_within_its_tolerance():
+    """A rigid rod on a hinge, few steps between many rows, beside its equation by SciPy."""
+    rod = rigid_body(
+        "rod", mass=1.0, inertia=(1e-3, 0.1, 0.1), centre_of_mass=(0.5, 0, 0), points={"a": (0, 0, 0), "tip": (1, 0, 0)}
+    )
+    hinge = Joint("hinge", "revolute", "ground.O", "rod.a")
+    scene = Scene((Body("rod", rod),), (hinge,), ground={"O": (0, 0, 0)}, gravity=(0, -9.81, 0))
+    run = integrate(scene, end=2.0, output_step=0.02, method=DormandPrince(tolerances(1e-9)))
+    assert run.attributes["steps"] < 2 * run.time.size
+    exact = solve_ivp(
+        lambda t, y: [y[1], -0.5 * 9.81 * np.cos(y[0]) / 0.35],
+        *((0.0, 2.0), (0.0, 0.0)),
+        method="DOP853", rtol=1e-13, atol=1e-13, t_eval=run.time,
+    )  # fmt: skip
+    angle, rate = exact.y
+    along, across = np.array([np.cos(angle), np.sin(angle)]).T, np.array([-np.sin(angle), np.cos(angle)]).T
+    np.testing.assert_allclose(run["rod.tip.position"][:, :2], along, atol=5e-9)
+    np.testing.assert_allclose(run["rod.tip.velocity"][:, :2], rate[:, None] * across, atol=2e-8)
 
 
 def test_stiff_modes_do_not_limit_the_linearly_implicit_method():
