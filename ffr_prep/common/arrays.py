@@ -11,7 +11,7 @@ Array = np.ndarray
 def distinct(numbers: Array) -> Array:
     """The integers of an array of any shape, ascending, each once: by sorting, which takes half of the time of hashing."""
     ascending = np.sort(numbers, axis=None)
-    return ascending[np.concatenate([ascending[:1] == ascending[:1], ascending[1:] != ascending[:-1]])]
+    return ascending[np.append(np.ones(min(ascending.size, 1), bool), np.diff(ascending) != 0)]
 
 
 def among(numbers: Array, ascending: Array) -> Array:
