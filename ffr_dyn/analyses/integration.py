@@ -21,7 +21,7 @@ from ffr_dyn.compile.engine import Engine, fill_rows, new_engine, record_row
 from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.compile.workspace import new_record
 from ffr_dyn.consistency import failure as failing
-from ffr_dyn.consistency.assemble import Assembled, assemble
+from ffr_dyn.consistency.assemble import BRANCHES, Assembled, assemble
 from ffr_dyn.consistency.doubts import BALANCE, SINGULAR, Seen, between_rows, ended, held, look, nothing_seen
 from ffr_dyn.consistency.evaluation import joined
 from ffr_dyn.consistency.explicit_forces import told
@@ -347,7 +347,8 @@ def _advance(
         if status != OK:
             _require_soft(run, method, status, reached(run.engine, start))
             gained = run.energy.gains
-            settings = failing.Settings(method, gained[2] > 0, excess_of_gains(gained, run.energy.spacing))
+            branches = BRANCHES if run.done == 0 and BRANCHES in assembled.notes else ""
+            settings = failing.Settings(method, gained[2] > 0, excess_of_gains(gained, run.energy.spacing), branches)
             raise failing.failure(run.engine.system, run.engine.work, status, reached(run.engine, start), settings)
         count = int(min(max(count * SECONDS_PER_CALL / max(watch.last, 1e-6), 1), 10 * count))
 

@@ -38,12 +38,13 @@ HUGE = 1e12  # N, N m: no force of a machine; what made the state overflow
 
 @dataclass(frozen=True)
 class Settings:
-    """Those of a run: its method, None of a single evaluation; whether a projection holds the constraints; and why they lose
-    any state, where that is known."""
+    """Those of a run: its method, None of a single evaluation; whether a projection holds the constraints; why they lose
+    any state, where that is known; and why a run that has hardly begun may have lost it, where nothing else tells."""
 
     method: Integrator | None = None
     projected: bool = False
     cause: str = ""
+    start: str = ""
 
 
 def failure(system: System, work: Work, status: int, time: float, settings: Settings = Settings()) -> BaseException:
@@ -139,6 +140,8 @@ def _overflow(system: System, work: Work, settings: Settings) -> str:
     if value > HUGE:
         change = ", or use a smaller step" if _follows(system, name) else ""
         return f"{name!r} exerts {value:.3g} N or N m; look at its numbers and their units{change}"
+    if settings.start:
+        return settings.start
     if settings.method is None:
         return (
             "a force, an initial state or a driver is far too large there, or a solver has lost the motion before; look "

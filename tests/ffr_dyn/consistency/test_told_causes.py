@@ -1,4 +1,5 @@
-"""What is told names the cause: small jumps of drivers, explicit forces that are too stiff, energy of negative springs."""
+"""What is told names the cause: small jumps of drivers, explicit forces that are too stiff, energy of negative springs, a
+start that many motions leave."""
 
 from __future__ import annotations
 
@@ -68,3 +69,21 @@ def test_statics_tells_a_force_that_jumps_from_a_motion_that_nothing_holds():
         fd.ComputationError, match=r"a force jumps, has a kink or a pole near there, along guide\.stroke"
     ):
         fd.static(sliding(forces=(spring,), loads=(jumping,)))
+
+
+def test_a_net_that_is_lost_at_its_flat_start_is_told_so():
+    """Nine square plates on spherical joints at the middles of their edges, hung up along one side, and flat."""
+    sides = {"west": (-0.05, 0, 0), "east": (0.05, 0, 0), "south": (0, -0.05, 0), "north": (0, 0.05, 0)}
+    plate = fp.rigid_body("plate", mass=0.1, inertia=(1e-4, 1e-4, 2e-4), points=sides)
+    places = [(i, j) for i in range(3) for j in range(3)]
+    bodies = [fd.Body(f"p{i}{j}", plate, position=(0.1 * i, 0.1 * j, 0)) for i, j in places]
+    ends = [(f"p{i - 1}{j}.east", f"p{i}{j}.west") for i, j in places if i]
+    ends += [(f"p{i}{j - 1}.north", f"p{i}{j}.south") for i, j in places if j]
+    ends += [(f"ground.g{i}", f"p{i}2.north") for i in range(3)]
+    joints = [fd.Joint(f"j{k}", "spherical", *pair) for k, pair in enumerate(ends)]
+    ground = {f"g{i}": (0.1 * i, 0.25, 0) for i in range(3)}
+    scene = fd.Scene(bodies, joints, ground=ground, gravity=(0, 0, -9.81))
+    with pytest.raises(
+        fd.ComputationError, match=r"no longer finite: the scene starts in a singular position.* draw it a"
+    ):
+        fd.forward(scene, end=0.01, output_step=0.01, method=fd.ROS2(1e-4))
