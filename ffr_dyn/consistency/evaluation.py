@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.linalg import solve_triangular
+from scipy.linalg import qr, solve_triangular
 
 from ffr_dyn.compile.engine import Engine, new_engine, record_row
 from ffr_dyn.compile.scene_tables import System
@@ -27,6 +27,7 @@ from ffr_dyn.equations.layout import (
     velocity_sizes,
 )
 from ffr_dyn.functions.rotation import skew
+from ffr_dyn.kernels.entry_points import project
 from ffr_dyn.kernels.simd.table_address import pack
 from ffr_dyn.kernels.tables import IN_Q, IN_SHARED, OK, SINGULAR_CONSTRAINT, Record, Work
 from ffr_dyn.scene.scene import Scene
@@ -254,9 +255,29 @@ def free_motions(jacobian: Array, M: Array) -> Array:
         return _raised(lower, np.eye(len(lower)))
     weighted = _lowered(lower, jacobian.T).T
     length = np.linalg.norm(weighted, axis=1)
-    _, values, basis = np.linalg.svd(weighted / np.where(length > 0, length, 1.0)[:, None])
+    return _raised(lower, _complement((weighted / np.where(length > 0, length, 1.0)[:, None]).T))
+
+
+def _complement(columns: Array) -> Array:
+    """(V, d) orthonormal vectors at right angles to all columns (V, C): a fifth of the time of a singular value
+    decomposition of these, whose small factor alone is looked at for its rank."""
+    Q, R = qr(columns, check_finite=False)
+    size = min(columns.shape)
+    values = np.linalg.svd(R[:size], compute_uv=False)
     rank = int((values > RANK_TOLERANCE * values.max(initial=0.0)).sum())
-    return _raised(lower, basis[rank:].T)
+    if rank == size:
+        return Q[:, size:]
+    left = np.linalg.svd(R[:size])[0]
+    return np.hstack([Q[:, :size] @ left[:, rank:], Q[:, size:]])
+
+
+def smallest_motion(at: Evaluator, now: Evaluation, rates: Array) -> Array:
+    """(V,) the motion, smallest in the norm of the mass matrix, by which the rows change at these rates (C,), at the state
+    that was evaluated last, `now`."""
+    if now.singular:
+        return smallest_step(now.jacobian, evaluated_mass_matrix(at), rates)
+    project(at.engine.tables, -rates[: at.work.rows.Phi.size])
+    return at.work.bodies.acc.copy()
 
 
 def smallest_step(jacobian: Array, M: Array, target: Array, tolerance: float = RANK_TOLERANCE) -> Array:

@@ -34,6 +34,8 @@ def vibrations(assembled: Assembled, time: float) -> Vibrations:
     """Raises ComputationError as an evaluation does."""
     system = assembled.system
     scene, place = system.scene, system.layout
+    if not any(place.n):
+        return Vibrations(assembled, np.zeros(0), np.zeros(0), np.zeros((place.v_size, 0)))
     now = evaluate(evaluator(system), time, assembled.x, assembled.v)
     Z = free_motions(now.jacobian, total_mass_matrix(scene, place, assembled.x))
     square, rate = np.zeros(place.v_size), np.zeros((place.v_size, place.v_size))

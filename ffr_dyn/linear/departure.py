@@ -17,7 +17,7 @@ import numpy as np
 
 from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.consistency.assemble import Assembled, assemble, in_space
-from ffr_dyn.consistency.evaluation import evaluate, evaluator, free_motions, total_mass_matrix
+from ffr_dyn.consistency.evaluation import evaluate, evaluator, locked, smallest_motion
 from ffr_dyn.equations.layout import to_global_axes, velocity_sizes
 from ffr_dyn.results.quantities import catalogue
 from ffr_dyn.results.result import Result
@@ -51,11 +51,11 @@ def free_to_leave(
 def pushed(assembled: Assembled, time: float, lasts: float) -> Assembled:
     """The state with the push of a run that lasts so long [s]. Raises ComputationError as an evaluation does."""
     scene, place = assembled.system.scene, assembled.system.layout
-    now = evaluate(evaluator(assembled.system), time, assembled.x, assembled.v)
-    M = total_mass_matrix(scene, place, assembled.x)
-    Z = free_motions(now.jacobian, M)
-    push = np.random.default_rng(0).normal(size=place.v_size)
-    faster = Z @ (Z.T @ (M @ (PUSH / lasts * velocity_sizes(scene, place) * push)))
+    at = evaluator(assembled.system)
+    now = evaluate(at, time, assembled.x, assembled.v)
+    push = PUSH / lasts * velocity_sizes(scene, place) * np.random.default_rng(0).normal(size=place.v_size)
+    push[locked(place)] = 0.0
+    faster = push + smallest_motion(at, now, -(now.jacobian @ push))
     return replace(assembled, v=assembled.v + to_global_axes(place, assembled.x, faster))
 
 
