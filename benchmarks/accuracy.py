@@ -22,8 +22,8 @@ chosen, `--all` both.
 
 from __future__ import annotations
 
+import argparse
 import statistics
-import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -224,23 +224,22 @@ def summary(name: str, every: list[Found]) -> str:
     )
 
 
-def option(arguments: list[str], flag: str, default: str) -> str:
-    if flag not in arguments:
-        return default
-    at = arguments.index(flag)
-    value = arguments[at + 1]
-    del arguments[at : at + 2]
-    return value
-
-
 def main() -> None:
-    arguments = sys.argv[1:]
-    methods = option(arguments, "--method", "ros2,ros3").split(",")
-    variants = option(arguments, "--variants", ",".join(VARIANTS)).split(",")
-    listed = UNSEEN if "--unseen" in arguments else CASES
-    listed = [*CASES, *UNSEEN] if "--all" in arguments else listed
-    names = [name for name in arguments if name not in ("--unseen", "--all")]
-    cases = [case for case in listed if not names or case.name in names]
+    """Print the tables."""
+    every = [*CASES, *UNSEEN]
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("cases", nargs="*", metavar="case", help=", ".join(case.name for case in every))
+    parser.add_argument("--method", default="ros2,ros3", help="names with commas between them")
+    parser.add_argument("--variants", default=",".join(VARIANTS), help="names with commas between them")
+    which = parser.add_mutually_exclusive_group()
+    which.add_argument("--unseen", action="store_true", help="the scenes on which nothing was chosen")
+    which.add_argument("--all", action="store_true", help="these and the benchmark set")
+    given = parser.parse_args()
+    listed = every if given.all else (UNSEEN if given.unseen else CASES)
+    cases = [case for case in listed if not given.cases or case.name in given.cases]
+    if strange := {*given.cases} - {case.name for case in listed}:
+        parser.error(f"no case {sorted(strange)[0]!r}; there are {', '.join(case.name for case in listed)}")
+    methods, variants = given.method.split(","), given.variants.split(",")
     found = {(method, variant): report(method, cases, variant) for method in methods for variant in variants}
     together = {method: [one for variant in variants for one in found[method, variant]] for method in methods}
     lines = [summary(" ".join(of), every) for of, every in found.items() if every]

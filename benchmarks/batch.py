@@ -11,6 +11,7 @@ nothing else to do.
 
 from __future__ import annotations
 
+import argparse
 import sys
 import time
 from dataclasses import replace
@@ -41,8 +42,13 @@ def equal(one: fd.Result, other: fd.Result) -> bool:
     )
 
 
-def main(count: int = 4096, end: float = 0.25) -> int:
+def main() -> int:
     """Print the figures."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("scenes", nargs="?", type=int, default=4096)
+    parser.add_argument("seconds", nargs="?", type=float, default=0.25, help="of each scene")
+    given = parser.parse_args()
+    count, end = given.scenes, given.seconds
     whole, stopwatch = scenes(count), Stopwatch()
     fd.forward(whole[0], end=end, check=False, **HOW)
     single = batch = 0.0
@@ -65,4 +71,4 @@ def main(count: int = 4096, end: float = 0.25) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main(*(kind(word) for kind, word in zip((int, float), sys.argv[1:], strict=False))))
+    sys.exit(main())

@@ -31,7 +31,7 @@ coordinates of each, statically complete, in the plane where there is one; stiff
 
 from __future__ import annotations
 
-import sys
+import argparse
 import time
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
@@ -435,15 +435,23 @@ def _searched(row: Row) -> float:
 
 
 def main() -> None:
-    names = [name for name in sys.argv[1:] if not name.startswith("--")]
-    listed = UNSEEN if "--unseen" in sys.argv else CASES
-    cases, rows = [case for case in listed if not names or case.name in names], []
+    """Print the statements and the table."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("cases", nargs="*", metavar="case", help=", ".join(case.name for case in [*CASES, *UNSEEN]))
+    parser.add_argument("--unseen", action="store_true", help="the scenes on which nothing was chosen")
+    parser.add_argument("--statements", action="store_true", help="only whether what is said of a model is true")
+    parser.add_argument("--no-grid", action="store_true", help="without the search of all models for the cheapest")
+    given = parser.parse_args()
+    listed = UNSEEN if given.unseen else CASES
+    if strange := {*given.cases} - {case.name for case in listed}:
+        parser.error(f"no case {sorted(strange)[0]!r}; there are {', '.join(case.name for case in listed)}")
+    cases, rows = [case for case in listed if not given.cases or case.name in given.cases], []
     tell_statements(cases)
-    if "--statements" in sys.argv:
+    if given.statements:
         return
     print(HEAD)
     for one in cases:
-        for row in rows_of(one, with_grid="--no-grid" not in sys.argv):
+        for row in rows_of(one, with_grid=not given.no_grid):
             rows.append(row)
             print(line(row), flush=True)
     print("\nu: without stiffening; rep: refinements after verification\n")

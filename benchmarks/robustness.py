@@ -13,6 +13,7 @@ stopped to the bit.
 
 from __future__ import annotations
 
+import argparse
 import resource
 import signal
 import subprocess
@@ -127,11 +128,17 @@ def losses(kills: int, disks: int, folder: Path) -> bool:
     return equal and not lost
 
 
-def main(total: int = 100_000, kills: int = 200, disks: int = 50) -> int:
+def main() -> int:
+    """Print what was found."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("files", nargs="?", type=int, default=100_000, help="changed by chance, to be read")
+    parser.add_argument("kills", nargs="?", type=int, default=200, help="of runs")
+    parser.add_argument("disks", nargs="?", type=int, default=50, help="that are full")
+    given = parser.parse_args()
     with tempfile.TemporaryDirectory(prefix="ffr-robustness-") as folder:
-        fine = [inputs(total, Path(folder)), losses(kills, disks, Path(folder))]
+        fine = [inputs(given.files, Path(folder)), losses(given.kills, given.disks, Path(folder))]
     return 0 if all(fine) else 1
 
 
 if __name__ == "__main__":
-    sys.exit(main(*map(int, sys.argv[1:])))
+    sys.exit(main())

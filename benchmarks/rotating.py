@@ -16,6 +16,7 @@ Chandra, Smart Mater. Struct. 5 (1996).
 
 from __future__ import annotations
 
+import argparse
 import re
 import sys
 import time
@@ -555,11 +556,11 @@ CASES: dict[str, Callable[[], Iterator[Figure]]] = {
 
 def main() -> None:
     """Print the figures of the cases that are named, or of all."""
-    wanted = sys.argv[1:] or list(CASES)
-    unknown = [name for name in wanted if name not in CASES]
-    if unknown:
-        sys.exit(f"there is no case {unknown[0]!r}; there are {', '.join(CASES)}")
-    missed = 0
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("cases", nargs="*", metavar="case", help=", ".join(CASES))
+    wanted, missed = parser.parse_args().cases or list(CASES), 0
+    if strange := [name for name in wanted if name not in CASES]:
+        parser.error(f"no case {strange[0]!r}; there are {', '.join(CASES)}")
     for name in wanted:
         for figure in CASES[name]():
             missed += not figure.met

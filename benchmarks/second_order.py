@@ -10,6 +10,7 @@ stops with an error is a line too.
 
 from __future__ import annotations
 
+import argparse
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -30,11 +31,11 @@ CASES: dict[str, Callable[[], Iterator[Figure]]] = {
 
 def main() -> None:
     """Print the figures of the cases that are named, or of all."""
-    wanted = sys.argv[1:] or list(CASES)
-    unknown = [name for name in wanted if name not in CASES]
-    if unknown:
-        sys.exit(f"there is no case {unknown[0]!r}; there are {', '.join(CASES)}")
-    missed = 0
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("cases", nargs="*", metavar="case", help=", ".join(CASES))
+    wanted, missed = parser.parse_args().cases or list(CASES), 0
+    if strange := [name for name in wanted if name not in CASES]:
+        parser.error(f"no case {strange[0]!r}; there are {', '.join(CASES)}")
     for name in wanted:
         began = time.perf_counter()
         for figure in CASES[name]():

@@ -7,8 +7,8 @@ forces with RK4, where they are explicit, by its four evaluations as two.
 
 from __future__ import annotations
 
+import argparse
 import statistics
-import sys
 from dataclasses import replace
 
 from benchmarks.courses import FIXED_INTERFACE_MODES, LINKS
@@ -58,8 +58,10 @@ def scenes(modes: int) -> dict[str, Scene]:
 
 
 def main() -> None:
-    """Print the table; the number of repetitions may be given."""
-    repeats = int(sys.argv[1]) if len(sys.argv) > 1 else 5
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("repeats", nargs="?", type=int, default=5, help="runs of each, of which the median counts")
+    repeats = parser.parse_args().repeats
     print(f"processor time of a step of ROS2, chain of {LINKS} [us]")
     for modes in FIXED_INTERFACE_MODES.values():
         made = scenes(modes)

@@ -10,6 +10,7 @@ Where others use the machine, processor time tells more than the clock does: bot
 
 from __future__ import annotations
 
+import argparse
 import os
 import resource
 import signal
@@ -156,8 +157,17 @@ def with_kills(folder: Path, runs: int, bodies: int) -> bytes:
     return table.read_bytes()
 
 
-def main(runs: int = 1000, bodies: int = 20) -> int:
+def main() -> int:
     """Print the table of figures."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("runs", nargs="?", type=int, default=1000)
+    parser.add_argument("bodies", nargs="?", type=int, default=20)
+    parser.add_argument("--only", type=Path, help=argparse.SUPPRESS)  # the study alone, in a process that is killed
+    given = parser.parse_args()
+    runs, bodies = given.runs, given.bodies
+    if given.only:
+        sweep(made(given.only, runs, bodies), given.only / "killed.nc", workers=WORKERS, cache=given.only / "second")
+        return 0
     with tempfile.TemporaryDirectory(prefix="ffr-sweep-") as name:
         folder = Path(name)
         whole = made(folder, runs, bodies)
@@ -174,8 +184,4 @@ def main(runs: int = 1000, bodies: int = 20) -> int:
 
 
 if __name__ == "__main__":
-    if sys.argv[1:2] == ["--only"]:
-        at, numbers = Path(sys.argv[2]), list(map(int, sys.argv[3:]))
-        sweep(made(at, *numbers), at / "killed.nc", workers=WORKERS, cache=at / "second")
-    else:
-        sys.exit(main(*map(int, sys.argv[1:])))
+    sys.exit(main())
