@@ -14,14 +14,14 @@ import numpy as np
 from ffr_dyn.compile.engine import with_model
 from ffr_dyn.consistency.evaluation import Evaluator
 from ffr_dyn.equations.forces import At, applied_by
-from ffr_dyn.equations.layout import length_of, velocity_sizes
+from ffr_dyn.equations.layout import velocity_sizes
 from ffr_dyn.functions.operations import MULTIPLY
 from ffr_dyn.functions.time_functions import TimeFunction, constant, operation, piecewise
 from ffr_dyn.kernels.tables import LAW
 from ffr_dyn.scene.checks import check_marker, check_name, check_own_name
 from ffr_dyn.scene.force_kinds import forces_of
 from ffr_dyn.scene.forces import Actuator, Load
-from ffr_dyn.scene.scene import Scene
+from ffr_dyn.scene.scene import Scene, length_of
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 

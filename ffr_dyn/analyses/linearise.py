@@ -30,7 +30,7 @@ from ffr_dyn.consistency.evaluation import Evaluator, evaluate, evaluator
 from ffr_dyn.consistency.kinks import kinked_forces
 from ffr_dyn.consistency.tangent import STEP, Chart, at_rest, chart, derivative, rates, sizes, state, state_matrix
 from ffr_dyn.equations.forces import At
-from ffr_dyn.equations.layout import length_of, to_global_axes
+from ffr_dyn.equations.layout import to_global_axes
 from ffr_dyn.kernels.tables import LAW
 from ffr_dyn.linear.eigen import NULL, eigen
 from ffr_dyn.linear.matrices import Modes, graded, modes_of, reduced
@@ -46,7 +46,7 @@ from ffr_dyn.results.result import Axis, Quantity, Result
 from ffr_dyn.scene.checks import several
 from ffr_dyn.scene.described import described
 from ffr_dyn.scene.forces.load import Load
-from ffr_dyn.scene.scene import Scene
+from ffr_dyn.scene.scene import Scene, length_of
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.brief import Brief
 from ffr_prep.common.errors import ComputationError, InputError

@@ -37,7 +37,7 @@ from ffr_dyn.kernels.tables import EVALUATIONS
 from ffr_dyn.results.quantities import selected
 from ffr_dyn.results.result import Result
 from ffr_dyn.scene.described import described
-from ffr_dyn.scene.scene import Scene
+from ffr_dyn.scene.scene import Scene, length_of
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError, InputError
 
@@ -75,10 +75,23 @@ def static(
     assembled = assemble(seen_in_space(held(scene, time)), time=time)
     selected(assembled.system, outputs)
     at = evaluator(assembled.system)
-    found = equilibrium(assembled.system, time, assembled.x, sizes(at))
+    widths = _widths(at, assembled.x)
+    found = equilibrium(assembled.system, time, assembled.x, widths)
     lowest, flutter = _lowest_stiffness(at, assembled, found, time)
-    branch = jumped(assembled.system, time, assembled.x, sizes(at), found)
+    branch = jumped(assembled.system, time, assembled.x, widths, found)
     return _result(scene, assembled, at, found, time, (lowest, flutter, branch), outputs, path)
+
+
+def _widths(at: Evaluator, x: Array) -> Array:
+    """(V,) what counts as a step of one: as `sizes`, but the places of bodies, which move by as much as all of them together
+    reach, or as they are apart."""
+    scene, place, widths = at.system.scene, at.system.layout, sizes(at)
+    places = np.array([x[place.R(b)] for b in range(len(place.n))])
+    apart = float(np.linalg.norm(np.ptp(places, axis=0))) + length_of(scene)
+    together = sum(body.model.size for body in scene.bodies)
+    for b in range(len(place.n)):
+        widths[place.R_dot(b)] = max(length_of(scene), min(apart, together))
+    return widths
 
 
 def _lowest_stiffness(at: Evaluator, assembled: Assembled, found: Equilibrium, time: float) -> tuple[float, float]:

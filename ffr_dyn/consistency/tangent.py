@@ -17,11 +17,12 @@ import numpy as np
 from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.consistency.evaluation import Evaluator, evaluate, free_motions, smallest_step, total_mass_matrix
 from ffr_dyn.equations.inertia import kept_integrals
-from ffr_dyn.equations.layout import length_of, moved, to_body_axes, to_global_axes
+from ffr_dyn.equations.layout import moved, to_body_axes, to_global_axes
 from ffr_dyn.equations.spinning import by_deflections
 from ffr_dyn.equations.statics import balance, damping
 from ffr_dyn.functions.differences import differences
 from ffr_dyn.functions.rotation import rotation_matrix, skew
+from ffr_dyn.scene.scene import length_of
 from ffr_prep.common.arrays import Array
 
 # Largest relative movement [rad, or part of the scene's size] of a difference: stiff bodies stretch with its square.

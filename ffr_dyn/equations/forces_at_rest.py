@@ -14,13 +14,14 @@ import numpy as np
 
 from ffr_dyn.equations.forces import At
 from ffr_dyn.equations.jets import SECOND, SIZE, Jet, coordinates
-from ffr_dyn.equations.layout import length_of, moved, to_global_axes, velocity_sizes
+from ffr_dyn.equations.layout import moved, to_global_axes, velocity_sizes
 from ffr_dyn.equations.placed import Sums, pair
 from ffr_dyn.equations.state_view import StateView
 from ffr_dyn.functions.differences import differences as differences_by
 from ffr_dyn.functions.rotation import skew
 from ffr_dyn.scene.forces.force import Force
 from ffr_dyn.scene.forces.places import AtMarker, OnBody, OnJoint
+from ffr_dyn.scene.scene import length_of
 from ffr_prep.common.arrays import Array
 
 STEP = 1e-6  # rad, or of the size of the scene: of differences of laws by what they are functions of, the first

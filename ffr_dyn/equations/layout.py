@@ -8,7 +8,7 @@ from itertools import accumulate
 import numpy as np
 
 from ffr_dyn.functions.rotation import from_vector, product, rotation_matrix
-from ffr_dyn.scene.scene import Scene, body_normal
+from ffr_dyn.scene.scene import Scene, body_normal, length_of
 from ffr_dyn.variants.plane import AXES
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.brief import Brief
@@ -74,14 +74,6 @@ def initial_state(scene: Scene, place: Layout) -> tuple[Array, Array]:
         x[place.R(b)], x[place.p(b)], x[place.q(b)] = body.position, body.rotation, body.q
         v[place.R_dot(b)], v[place.omega(b)], v[place.q_dot(b)] = body.velocity, body.omega_bar, body.q_dot
     return x, v
-
-
-def length_of(scene: Scene) -> float:
-    """[m] of a scene: to the farthest interface of a body, or the largest radius of gyration; one of mere points."""
-    points = [i.position for body in scene.bodies for i in body.model.interfaces]
-    extent = max((float(np.linalg.norm(p)) for p in points), default=0.0)
-    inertia = [np.sqrt(np.trace(body.model.rr_dm) / body.model.mass) for body in scene.bodies]
-    return max(extent, *map(float, inertia)) or 1.0
 
 
 def velocity_sizes(scene: Scene, place: Layout) -> Array:

@@ -20,7 +20,7 @@ from ffr_dyn.compile.workspace import new_record
 from ffr_dyn.consistency.evaluation import Evaluator, evaluate, evaluator, rows_close
 from ffr_dyn.consistency.failure import failure
 from ffr_dyn.consistency.tangent import STEP, Chart, chart, sizes_of
-from ffr_dyn.equations.layout import ROUNDING, Layout, length_of, moved, to_body_axes, to_global_axes
+from ffr_dyn.equations.layout import ROUNDING, Layout, moved, to_body_axes, to_global_axes
 from ffr_dyn.functions.rotation import rotation_matrix
 from ffr_dyn.functions.time_functions import evaluate as value_of
 from ffr_dyn.functions.together import together
@@ -28,7 +28,7 @@ from ffr_dyn.integrators import Integrator
 from ffr_dyn.integrators.stabilisation import Projection, gains
 from ffr_dyn.kernels.tables import OK, Record
 from ffr_dyn.scene.drivers import Driver
-from ffr_dyn.scene.scene import Scene
+from ffr_dyn.scene.scene import Scene, length_of
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError, InputError
 

@@ -194,6 +194,13 @@ class Scene(Brief):
         return {f"{body}.{point}": k for k, (_, body, point) in enumerate(self._markers)}
 
     @cached_property
+    def _length(self) -> float:
+        points = [i.position for body in self.bodies for i in body.model.interfaces]
+        extent = max((float(np.linalg.norm(p)) for p in points), default=0.0)
+        inertia = [np.sqrt(np.trace(body.model.rr_dm) / body.model.mass) for body in self.bodies]
+        return max(extent, *map(float, inertia)) or 1.0
+
+    @cached_property
     def _used(self) -> dict[str, tuple[str, ...]]:
         """`used_interfaces` by the name of the body."""
         pairs: tuple[Any, ...] = (*self.joints, *(driver for driver in self.drivers if isinstance(driver, PointDriver)))
@@ -268,6 +275,11 @@ def require_scene(given: Any) -> None:
     """InputError for what is no scene, such as the name of a file."""
     if not isinstance(given, Scene):
         raise InputError(f"the scene is {in_short(given)}, not a Scene; load_scene(path)[0] is that of a scene file")
+
+
+def length_of(scene: Scene) -> float:
+    """[m] of a scene: to the farthest interface of a body, or the largest radius of gyration; one of mere points."""
+    return scene._length
 
 
 def markers(scene: Scene) -> tuple[MarkerName, ...]:

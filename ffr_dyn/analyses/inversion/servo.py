@@ -39,19 +39,11 @@ from ffr_dyn.consistency.mobility import coordinate_gradients, coordinate_word
 from ffr_dyn.equations.constraint_rows import Block
 from ffr_dyn.equations.constraints import evaluate_word
 from ffr_dyn.equations.forces import At
-from ffr_dyn.equations.layout import (
-    Layout,
-    length_of,
-    meets,
-    moved,
-    to_body_axes,
-    to_global_axes,
-    velocity_sizes,
-)
+from ffr_dyn.equations.layout import Layout, meets, moved, to_body_axes, to_global_axes, velocity_sizes
 from ffr_dyn.functions.time_functions import polynomial
 from ffr_dyn.scene.drivers import Driver, driver_word
 from ffr_dyn.scene.joints import COORDINATES, DRIVEN_ANGLE, Word
-from ffr_dyn.scene.scene import Scene, marker_number
+from ffr_dyn.scene.scene import Scene, length_of, marker_number
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError, InputError
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 
@@ -84,3 +86,20 @@ def test_a_pendulum_that_swings_to_where_it_hangs_is_on_no_other_branch():
         spring = fd.JointSpring("spring", "hinge", stiffness=0.1)
         scene = fd.Scene((body,), (hinge,), ground={"o": (0, 0, 0)}, gravity=(0, -9.81, 0), forces=(spring,))
         assert not told(fd.static(scene))
+
+
+def test_a_chain_bends_by_more_than_its_links_in_few_steps():
+    """Forty links on springs, level at the start: steps are short beside the chain, not beside a link."""
+    link = fp.rigid_body("link", mass=0.1, inertia=(1e-5, 1e-4, 1e-4), points={"a": (-0.05, 0, 0), "b": (0.05, 0, 0)})
+    bodies = [fd.Body(f"l{k}", link, position=(0.05 + 0.1 * k, 0, 0)) for k in range(40)]
+    ends = ["ground.o", *(f"l{k}.b" for k in range(39))]
+    joints = [fd.Joint(f"r{k}", "revolute", end, f"l{k}.a") for k, end in enumerate(ends)]
+    springs = [fd.JointSpring(f"s{k}", f"r{k}", stiffness=1000.0) for k in range(40)]
+    scene = fd.Scene(bodies, joints, forces=springs, ground={"o": (0, 0, 0)}, gravity=(0, -9.81, 0))
+    found = fd.static(scene)
+    assert int(re.search(r"(\d+) steps", found.attributes["method"])[1]) <= 12
+    weight, places = 0.1 * 9.81, np.array([found[f"l{k}.R"][0, 0] for k in range(40)])
+    hinges = np.array([found[f"{end}.position"][0, 0] for end in ["l0.a", *ends[1:]]])
+    moments = [weight * (places[k:] - hinge).sum() for k, hinge in enumerate(hinges)]
+    np.testing.assert_allclose([found[f"r{k}.angle"][0] for k in range(40)], -np.array(moments) / 1000.0, rtol=1e-8)
+    assert found["l39.b.position"][0, 1] < -1.0
