@@ -30,8 +30,9 @@ from ffr_dyn.scene.followed import TURN
 from ffr_dyn.scene.force_kinds import forces_of
 from ffr_dyn.scene.scene import Scene, altered, require_scene
 from ffr_dyn.scene.sensors import Measurement
+from ffr_dyn.variants.aligned import levelled
 from ffr_dyn.variants.mean_axis import in_mean_axis_frames
-from ffr_dyn.variants.plane import obstacles, planar_forms
+from ffr_dyn.variants.plane import AXES, obstacles, planar_forms
 from ffr_prep.body import mesh_doubt, shear_doubt, steady_stress_doubt, units_doubts
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.brief import Brief
@@ -297,7 +298,11 @@ def in_space(scene: Scene) -> Scene:
 
 
 def seen_in_space(scene: Scene) -> Scene:
-    """As `in_space`; bodies that lack inertia across the plane that the scene is computed in have a trace of it."""
-    if scene.plane != "auto" or (traced := with_traces(scene)) is scene:
+    """As `in_space`. Where the scene is computed in a plane, places a hair beside it are put into it, so that redundant
+    joints close, and bodies that lack inertia across it have a trace of it."""
+    if scene.plane != "auto":
+        return scene
+    forms = {axis: levelled(with_traces(scene), normal) for normal, axis in enumerate(AXES)}
+    if all(form is scene for form in forms.values()):
         return in_space(scene)
-    return in_space(traced if _in_plane_or_space(scene, 0.0).scene.plane != "none" else scene)
+    return in_space(forms.get(_in_plane_or_space(scene, 0.0).scene.plane, scene))

@@ -403,6 +403,14 @@ def test_bores_a_hair_off_are_in_the_plane(plane, beside):
         for scene in (linkage(side, plane=plane), linkage(0 * side))
     ]
     np.testing.assert_allclose(runs[0][:, :2], runs[1][:, :2], atol=1e-9)
+    # What looks at it in space has its places in the plane as well; redundant joints could not be closed.
+    assert fd.mobility(linkage(side, plane=plane)).rigid == 0
+    held, still = (fd.static(scene)["o.moment"] for scene in (linkage(side, plane=plane), linkage(0 * side)))
+    np.testing.assert_allclose(held, still, atol=1e-5)
+    driven = fd.inverse(linkage(side, plane=plane), end=0.02, output_step=0.01, elastic=fd.QuasiStatic())
+    swinging = fd.linearise(replace(linkage(side, plane=plane), drivers=()))
+    assert np.isfinite(driven["motor.effort"]).all()
+    assert len(swinging.eigenvalues) == 2
 
 
 @pytest.mark.parametrize(
