@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ffr_dyn.analyses.integration import with_all_reactions
-from ffr_dyn.analyses.outcome import result_of
+from ffr_dyn.analyses.outcome import needed, result_of
 from ffr_dyn.analyses.registry import OfMoment
 from ffr_dyn.analyses.settings import MomentSettings
 from ffr_dyn.consistency.assemble import Assembled, assemble, turned
@@ -52,7 +52,7 @@ def assembly(
     >>> result = fd.assembly(scene)
     """
     assembled = assemble(scene, time=time)
-    selected(assembled.system, outputs)
+    selected(assembled.system, needed(scene, outputs))
     at = evaluator(assembled.system)
     rows = record_states(at, np.array([time]), assembled.x[None], assembled.v[None])
     record = with_all_reactions(assembled, rows)

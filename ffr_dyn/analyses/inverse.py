@@ -134,7 +134,7 @@ def _quasi_static(
 ) -> Result:
     """At every output time: the undeformed motion, then the deformation at which the elastic accelerations vanish."""
     assembled = assemble(scene, time=span[0])
-    selected(assembled.system, outputs)
+    selected(assembled.system, needed(scene, outputs))
     rigid = along_the_path(scene, span)
     at, places = evaluator(assembled.system), _coordinates(assembled)
     q, rows = np.zeros(places[1].size), []

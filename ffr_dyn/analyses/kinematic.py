@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from ffr_dyn.analyses.integration import with_all_reactions
-from ffr_dyn.analyses.outcome import output_times, result_of, turned_along
+from ffr_dyn.analyses.outcome import needed, output_times, result_of, turned_along
 from ffr_dyn.analyses.registry import OverTime
 from ffr_dyn.analyses.settings import Settings
 from ffr_dyn.closing.limits import with_limits
@@ -139,7 +139,7 @@ def along_the_path(
     rigid = undeformed(scene)
     require_driven(rigid, start, "a kinematic analysis")
     assembled = assemble(rigid, time=start)
-    selected(assembled.system, outputs)
+    selected(assembled.system, needed(scene, outputs))
     _refuse_poles(assembled.system, start, end, output_step)
     at = evaluator(assembled.all_rows or assembled.system)
     pose = replace(

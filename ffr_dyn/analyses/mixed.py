@@ -25,6 +25,7 @@ from ffr_dyn.analyses.inversion.plant import Plant, plant, slopes, with_efforts
 from ffr_dyn.analyses.inversion.servo import ServoMotion, at_moment, internal_values, servo, slope, slope_matrix
 from ffr_dyn.analyses.inversion.turns import not_counted
 from ffr_dyn.analyses.outcome import (
+    beyond,
     efforts,
     efforts_told,
     needed,
@@ -149,10 +150,16 @@ def mixed(
     if partners is not None and solution is None:
         result = forward(
             scene, end=end, output_step=output_step, method=method, start=start,
-            stabilisation=Projection(1e-12), outputs=needed(scene, outputs), path=path, progress=progress,
+            stabilisation=Projection(1e-12), outputs=needed(scene, beyond(_kept(unknown), outputs)), path=path,
+            progress=progress,
         )  # fmt: skip
         return _named(flattened(scene, start)[0], result, partners, outputs, path)
     return _not_collocated(scene, names, unknown, (start, end, output_step), solution, outputs, path, progress)
+
+
+def _kept(unknown: tuple[Effort, ...]) -> list[str]:
+    """What every result has of unknown forces."""
+    return [f"{effort.name}.{what}" for effort in unknown for what in ("effort", "power")]
 
 
 def _known(scene: Scene, known: tuple[str, ...] | None) -> tuple[str, ...]:
@@ -242,7 +249,8 @@ def _not_collocated(
     start, end, output_step = span
     assembled = assemble(with_units(scene, unknown), time=start)
     whole, degree = _fitted(assembled, names, unknown, (start, end))
-    selected(whole.free.system, outputs)
+    outputs = beyond(_kept(unknown), outputs)
+    selected(whole.free.system, needed(whole.free.system.scene, outputs))
     own = servo(assembled, names, whole.own.unknown, (start, end)) if degree == AT_ONCE else whole.own
     w = internal_values(own, assembled.x, assembled.v)
     chosen = _solution(own, degree, w, assembled.x, solution)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import fnmatch
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
@@ -73,15 +73,23 @@ def accompanying(scene: Scene) -> tuple[str, ...]:
 
 def needed(scene: Scene, outputs: Sequence[str]) -> tuple[str, ...]:
     """The quantities that must be computed for `outputs` and for the efforts, which come from default quantities."""
-    driven = {joint_of(scene, driver).i for driver in scene.drivers if isinstance(driver, Driver)}
+    joints = [driver for driver in scene.drivers if isinstance(driver, Driver)]
+    driven = {joint_of(scene, driver).i for driver in joints}
     turned = (f"{marker}.orientation" for marker in sorted(driven) if not marker.startswith(f"{GROUND}."))
-    return ("default", *accompanying(scene), *turned, *outputs)
+    asked = beyond([f"{driver.name}.effort" for driver in joints], outputs)
+    return ("default", *accompanying(scene), *turned, *asked)
+
+
+def beyond(kept: Sequence[str], outputs: Sequence[str]) -> tuple[str, ...]:
+    """Of `outputs` those that are none of the names that a result has anyway; a pattern of efforts asks for nothing else, as
+    those of couplings are default quantities."""
+    return tuple(o for o in outputs if o not in kept and not (o.endswith(".effort") and fnmatch.filter(kept, o)))
 
 
 def only(result: Result, scene: Scene, outputs: Sequence[str]) -> Result:
     """The result with no more than `outputs` and what accompanies them."""
     patterns = [*accompanying(scene), *(p for o in outputs for p in (DEFAULT_OUTPUTS if o == "default" else (o,)))]
-    kept = {name: q for name, q in result.quantities.items() if any(fnmatchcase(name, p) for p in patterns)}
+    kept = {name: q for name, q in result.quantities.items() if any(fnmatch.fnmatchcase(name, p) for p in patterns)}
     return Result(result.time, kept, result.geometry, result.attributes)
 
 

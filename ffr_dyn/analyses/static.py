@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ffr_dyn.analyses.integration import with_all_reactions
-from ffr_dyn.analyses.outcome import result_of, turned_along
+from ffr_dyn.analyses.outcome import needed, result_of, turned_along
 from ffr_dyn.analyses.registry import OfMoment
 from ffr_dyn.analyses.settings import MomentSettings
 from ffr_dyn.analyses.states import held
@@ -73,7 +73,7 @@ def static(
     >>> result = fd.static(scene)
     """
     assembled = assemble(seen_in_space(held(scene, time)), time=time)
-    selected(assembled.system, outputs)
+    selected(assembled.system, needed(scene, outputs))
     at = evaluator(assembled.system)
     widths = _widths(at, assembled.x)
     found = equilibrium(assembled.system, time, assembled.x, widths)

@@ -11,7 +11,7 @@ from scipy.sparse import block_diag, coo_array, csr_array
 from ffr_dyn.closing.constraints import Constraints, RowsAt, open_at, rows_at
 from ffr_dyn.closing.row_space import Matrix, smallest_solution
 from ffr_dyn.equations.inertia import kept_integrals, mass_matrix
-from ffr_dyn.equations.layout import Layout, meets, moved, to_global_axes
+from ffr_dyn.equations.layout import Layout, length_of, meets, moved, to_global_axes
 from ffr_dyn.scene.joints import DISTANCE
 from ffr_dyn.scene.scene import Body, Scene
 from ffr_prep.body import remembered
@@ -21,17 +21,20 @@ from ffr_prep.common.errors import InputError
 TOLERANCE = 1e-11  # of Phi [m, -] and of its rate
 ITERATIONS = 100
 LARGEST_TURN = 0.5  # rad per iteration
+FARTHEST = 1e4  # times what is open: how far a body is turned to close it while bodies can deform instead
 
 
 def close_positions(constraints: Constraints, x: Array, v: Array) -> Array:
     """Newton's method on Phi(x) = 0 with least-mass-norm steps; rigid motion first, elastic coordinates if they must.
+
+    A shaft whose bores are a hair off their line is not turned about it to make the best of the hair, but deformed by it.
 
     Raises InputError for rows that stay open.
     """
     place = constraints.place
     if meets(constraints.scene, x, open_at(constraints, x, v)[0], TOLERANCE):
         return x
-    start = x
+    start, length = x, length_of(constraints.scene)
     for elastic in (False, True):
         found, nearest = start, np.inf
         for _ in range(ITERATIONS):
@@ -39,7 +42,10 @@ def close_positions(constraints: Constraints, x: Array, v: Array) -> Array:
             left, met = np.abs(rows.Phi).max(initial=0.0), meets(constraints.scene, found, rows.Phi, TOLERANCE)
             if not elastic and left < nearest:  # from where bodies deform, if they must, by as little as they can
                 start, nearest = found, left
-            found = moved(place, found, _limited(place, _step(constraints, found, rows, -rows.Phi, elastic)))
+            step = _step(constraints, found, rows, -rows.Phi, elastic)
+            if not elastic and not met and any(place.n) and length * largest_turn(place, step) > FARTHEST * left:
+                break
+            found = moved(place, found, _limited(place, step))
             if met:  # and now to rounding, which tells rows that depend on others from those that nearly do
                 return found
     raise _open(constraints, rows)

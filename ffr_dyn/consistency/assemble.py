@@ -24,14 +24,15 @@ from ffr_dyn.consistency.held_frequencies import held_frequencies
 from ffr_dyn.consistency.sliding import sliding_notes
 from ffr_dyn.consistency.validity import deflections
 from ffr_dyn.equations.constraint_rows import Block, blocks_of
-from ffr_dyn.equations.layout import Layout, initial_state
+from ffr_dyn.equations.layout import Layout, initial_state, length_of
 from ffr_dyn.functions.overshoots import overshoots
 from ffr_dyn.scene.followed import TURN
 from ffr_dyn.scene.force_kinds import forces_of
 from ffr_dyn.scene.scene import Scene, altered, require_scene
 from ffr_dyn.scene.sensors import Measurement
+from ffr_dyn.variants.aligned import levelled
 from ffr_dyn.variants.mean_axis import in_mean_axis_frames
-from ffr_dyn.variants.plane import obstacles, planar_forms
+from ffr_dyn.variants.plane import AXES, obstacles, planar_forms
 from ffr_prep.body import mesh_doubt, shear_doubt, steady_stress_doubt, units_doubts
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.brief import Brief
@@ -40,6 +41,7 @@ from ffr_prep.common.errors import InputError
 _MOST_GRAVITY = 1000.0  # m/s^2; in mm/s^2 that of the Earth is 9810
 SHIFTED = 1e-6  # m, rad, from where it is told that assembly moved a body
 SLOWED = 1e-2  # of a velocity that a scene gives, from where it is told that a body has another
+ROUNDED = 1e-9  # of the fastest velocity that a scene gives, below which another is rounding
 RELAXATION = 1e-6  # of dependent rows, relative: rounding over it is what their reactions are uncertain by
 BRANCHES = (
     "the scene starts in a singular position, where its motion may branch: to choose, draw it a little way along the branch "
@@ -102,7 +104,7 @@ def assemble(scene: Scene, *, time: float = 0.0) -> Assembled:
     if found.singular:
         notes.insert(0, BRANCHES)
     notes = shifted(scene, place, guess, x) + _slowed(scene, place, given, v) + notes
-    if scene.plane != "none":
+    if scene.plane != "none" and any(body.model.n for body in scene.bodies):
         notes.append(
             f"the scene is planar (normal {scene.plane}): computed in the plane, with in-plane modes without their rounding "
             "across it"
@@ -193,11 +195,20 @@ def _slowed(scene: Scene, place: Layout, given: Array, v: Array) -> list[str]:
     """A note where a body does not begin with the velocity that the scene gives it, on the one that is farthest off."""
     if not given.any():
         return []
-    parts = [
-        (float(np.linalg.norm(v[where] - given[where]) / size), body.name, word, v[where], given[where])
+    length = length_of(scene)
+    velocities = [
+        (body.name, word, where, arm, float(np.linalg.norm(given[where])))
         for b, body in enumerate(scene.bodies)
-        for word, where in (("velocity {} m/s", place.R_dot(b)), ("omega_bar {} rad/s", place.omega(b)))
-        if (size := np.linalg.norm(given[where])) > 0
+        for word, where, arm in (
+            ("velocity {} m/s", place.R_dot(b), 1.0),
+            ("omega_bar {} rad/s", place.omega(b), length),
+        )
+    ]
+    fastest = max(size * arm for *_, arm, size in velocities)
+    parts = [
+        (float(np.linalg.norm(v[where] - given[where]) / size), name, word, v[where], given[where])
+        for name, word, where, arm, size in velocities
+        if size * arm > ROUNDED * fastest
     ]
     off, name, word, now, before = max(parts, key=lambda part: part[0], default=(0.0, "", "", v, v))
     if off <= SLOWED:
@@ -287,7 +298,11 @@ def in_space(scene: Scene) -> Scene:
 
 
 def seen_in_space(scene: Scene) -> Scene:
-    """As `in_space`; bodies that lack inertia across the plane that the scene is computed in have a trace of it."""
-    if scene.plane != "auto" or (traced := with_traces(scene)) is scene:
+    """As `in_space`. Where the scene is computed in a plane, places a hair beside it are put into it, so that redundant
+    joints close, and bodies that lack inertia across it have a trace of it."""
+    if scene.plane != "auto":
+        return scene
+    forms = {axis: levelled(with_traces(scene), normal) for normal, axis in enumerate(AXES)}
+    if all(form is scene for form in forms.values()):
         return in_space(scene)
-    return in_space(traced if _in_plane_or_space(scene, 0.0).scene.plane != "none" else scene)
+    return in_space(forms.get(_in_plane_or_space(scene, 0.0).scene.plane, scene))

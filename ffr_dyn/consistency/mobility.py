@@ -102,8 +102,9 @@ def rigid_freedom(scene: Scene, assembled: Assembled, time: float) -> int:
         return assembled.degrees_of_freedom
     try:
         return assemble(undeformed(scene), time=time).degrees_of_freedom
-    except InputError:
-        return max(assembled.degrees_of_freedom - elastic, 0)
+    except InputError:  # as where bores are a hair off their line, about which a shaft turns all the same
+        _, free = rigid_motions(*flattened(scene, time), assembled, time)
+        return max(assembled.degrees_of_freedom - elastic, free.shape[1])
 
 
 def mobility(scene: Scene, *, time: float = 0.0, drivers: bool = True) -> Mobility:
@@ -119,16 +120,22 @@ def mobility(scene: Scene, *, time: float = 0.0, drivers: bool = True) -> Mobili
     assembled = assemble(bare, time=time)
     flat, blocks = flattened(bare, time)
     place = assembled.system.layout
-    jacobian = _jacobian(flat, place, blocks, assembled.x, assembled.v, time)
-    rigid = np.concatenate([np.arange(place.iv[b], place.iv[b] + 6) for b in range(len(place.n))])
-    M = total_mass_matrix(flat, place, assembled.x)
-    Z = free_motions(jacobian[:, rigid], M[np.ix_(rigid, rigid)])
+    rigid, Z = rigid_motions(flat, blocks, assembled, time)
     motions = tuple(_motions(flat, place, assembled.x, assembled.v, rigid, Z))
     doubts = tuple(note for note in assembled.notes if note.startswith(("body ", "gravity ")))
     elastic = sum(place.n)
     free, plane = assembled.degrees_of_freedom, whole.scene.plane
     left = rigid_freedom(bare, assembled, time)
     return Mobility(free, left, elastic, plane, whole.computed, motions, assembled.redundant, over, doubts)
+
+
+def rigid_motions(flat: Scene, blocks: list[Block], assembled: Assembled, time: float) -> tuple[Array, Array]:
+    """Numbers of the velocities of frames, and the free motions (6B, F) of bodies that keep their shape, as assembled."""
+    place = assembled.system.layout
+    jacobian = _jacobian(flat, place, blocks, assembled.x, assembled.v, time)
+    rigid = np.concatenate([np.arange(place.iv[b], place.iv[b] + 6) for b in range(len(place.n))])
+    M = total_mass_matrix(flat, place, assembled.x)
+    return rigid, free_motions(jacobian[:, rigid], M[np.ix_(rigid, rigid)])
 
 
 def overdriven(scene: Scene, time: float = 0.0) -> tuple[str, ...]:

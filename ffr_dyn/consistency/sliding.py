@@ -9,6 +9,7 @@ from ffr_dyn.scene.scene import Body, Scene, marker_number, markers
 from ffr_prep.common.arrays import Array
 
 ALONG = ("translational", "cylindrical", "point-on-line", "screw")
+OF_I = "point-on-line"  # its line is that of i alone: j is a point, whatever way its body lies
 NEAR, FAR = 0.1, 0.3  # of the size of a body: how near to the line it lies, how far along it from the interface
 
 
@@ -16,7 +17,8 @@ def sliding_notes(scene: Scene) -> list[str]:
     """Notes on sliding joints whose line runs along a flexible body."""
     notes = []
     for joint in scene.joints:
-        for marker, frame in zip((joint.i, joint.j), frames(joint), strict=True) if joint.kind in ALONG else ():
+        lines = list(zip((joint.i, joint.j), frames(joint), strict=True)) if joint.kind in ALONG else []
+        for marker, frame in lines[:1] if joint.kind == OF_I else lines:
             b, _, point = markers(scene)[marker_number(scene, marker)]
             if b < len(scene.bodies) and _runs_along(scene.bodies[b], point, frame[:, 2]):
                 notes.append(_told(joint, scene.bodies[b], point))

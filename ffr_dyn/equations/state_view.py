@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from ffr_dyn.equations.kinematics import Turn, body_state, marker_motion, turning
 from ffr_dyn.equations.layout import Layout
 from ffr_dyn.functions.rotation import from_matrix, product, rotation_matrix
@@ -58,8 +60,16 @@ class StateView:
         return rotation_matrix(self.x[self.layout.p(self._number(body))])
 
     def _own(self, b: int, values: Array) -> Array:
-        frame = self.scene.bodies[b].frame
-        return frame.C @ values if frame else values
+        """Of a body's own coordinates, among them those that a planar scene leaves out, which rest."""
+        body = self.scene.bodies[b]
+        if body.frame:
+            return body.frame.C @ values
+        if not body.kept:
+            return values
+        numbers, count = body.kept
+        own = np.zeros(count)
+        own[list(numbers)] = values
+        return own
 
     def _own_turn(self, b: int) -> Turn | None:
         """How the own frame of a body stands in that in which it is computed; None where they are one."""

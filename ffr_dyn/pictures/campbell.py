@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +25,8 @@ def draw_campbell(result: Result, path: str | Path) -> Path:
 
     Every line has the name of its vibration at its end. Whirls are drawn with their frequencies from the ground, backward
     ones dashed; what does not whirl in its turning axes. Lines from the origin are orders (1x, 2x), circles on them critical
-    speeds, with their numbers [rad/s]. Where a vibration begins to grow, a line goes down to the damping.
+    speeds, with their numbers [rad/s]. Where a vibration begins to grow, and where it ends to, a line goes down to the
+    damping.
 
         fd.draw_campbell(fd.campbell(scene, speeds=range(0, 500, 25)), "campbell.png")
 
@@ -49,10 +51,11 @@ def draw_campbell(result: Result, path: str | Path) -> Path:
         for one in a["critical"]:
             _mark(upper, one["speed"], one["order"] * one["speed"] / (2 * np.pi), one["mode"].endswith("backward"))
         for one in a["limits"]:
-            for axes in (upper, lower):
-                axes.axvline(one["speed"], color=RED, linewidth=1.0)
-            lower.annotate(f" unstable from {one['speed']:.4g}", (one["speed"], 0.9), xycoords=("data", "axes fraction"),
-                           color=RED, fontsize=SMALL)  # fmt: skip
+            ends = [one[key] for key in ("speed", "until") if key in one]
+            for axes, at in product((upper, lower), ends):
+                axes.axvline(at, color=RED, linewidth=1.0)
+            lower.annotate(f" unstable from {' to '.join(f'{at:.4g}' for at in ends)}", (one["speed"], 0.9),
+                           xycoords=("data", "axes fraction"), color=RED, fontsize=SMALL)  # fmt: skip
         low, high = lower.get_ylim()
         lower.set(ylim=(min(low, -LEAST), max(high, LEAST)), ylabel="damping [%]", xlabel="speed [rad/s]")
         upper.secondary_xaxis("top", functions=(_to_rpm, _from_rpm)).set_xlabel("speed [rpm]")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from difflib import get_close_matches
+from functools import cached_property
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from ffr_dyn.equations.kinematics import marker_axis, marker_point
 from ffr_dyn.equations.layout import Layout
 from ffr_dyn.equations.state_view import StateView
 from ffr_dyn.functions.formula import Expression, names_in, value_of
+from ffr_dyn.functions.time_functions import TimeFunction, is_zero
 from ffr_dyn.scene.joints import COORDINATES, Joint, frames
 from ffr_dyn.scene.scene import GROUND, Scene, marker_names, marker_number
 from ffr_prep.common.arrays import Array
@@ -27,6 +29,11 @@ class StateFormula:
     """
 
     expressions: tuple[Expression, ...]
+
+    @cached_property
+    def zero(self) -> tuple[int, ...]:
+        """Numbers of the expressions that are zero whatever moves, which tell a plane that nothing acts across it."""
+        return tuple(k for k, one in enumerate(self.expressions) if isinstance(one, TimeFunction) and is_zero(one))
 
     def __call__(self, t: float, state: StateView) -> Array | float:
         measured = {name: _read(state, name) for expression in self.expressions for name in names_in(expression)}

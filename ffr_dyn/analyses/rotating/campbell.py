@@ -7,7 +7,7 @@ by Brent's method on steady motions in between.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
@@ -107,7 +107,8 @@ def campbell(
     ground, positive where the whirl is forward, both of the damped vibration; `damping_ratios` and `growth` [1/s]. Its
     attributes have the `names` of the vibrations; the `orders`; `critical`, a list of {speed, order, mode, axes}, where a
     frequency crosses an order: from the ground of what whirls, in the turning axes of what does not; and `limits`, a list of
-    {speed, mode}, where one begins to grow. A crossing is a resonance only if a force of that order excites the mode.
+    {speed, mode}, where one begins to grow, with `until`, up to where it does, if it ends. A crossing is a resonance only
+    if a force of that order excites the mode.
 
         found = fd.campbell(scene, speeds=np.linspace(0, 500, 21))
         fd.draw_campbell(found, "campbell.png")
@@ -132,7 +133,7 @@ def campbell(
             at, list(zip(values, spectra, strict=True)), m, bool(whirling[m]), orders if shown else ()
         )
         critical += [{**one, "mode": called[m]} for one in found]
-        limits += [{"speed": speed, "mode": called[m]} for speed in _limits(at, rows, m)]
+        limits += [{**one, "mode": called[m]} for one in _limits(at, rows, m)]
         if shown:
             progress(len(values) + count, len(values) + order.size)
     kept = [one.only(order) for one in spectra]
@@ -230,16 +231,23 @@ def _grown(speed: float, one: Spectrum, m: int) -> float:
     return _growth(speed, one, m) - float(rounding(one)[m])
 
 
-def _limits(at: AtSpeed, rows: Sequence[Row], m: int) -> list[float]:
-    """Speeds from where a vibration grows, away from rest, each between two rows: of one that is damped before, where it is
-    damped no more; of one that is not, where its growth is no rounding."""
-    found = []
+def _limits(at: AtSpeed, rows: Sequence[Row], m: int) -> list[dict[str, float]]:
+    """From which speed and until which a vibration grows, away from rest, each between two rows: where it is damped on the
+    other side, where it is damped no more; where it is not, where its growth is no rounding."""
+    begins, ends = list[float](), list[float]()
     for pair in pairwise(rows):
         inner, outer = sorted(pair, key=lambda row: abs(row[0]))
-        if _grown(*inner, m) < 0 < _grown(*outer, m):
-            damped = _growth(*inner, m) < -rounding(inner[1])[m]
-            found.append(_between(at, inner, outer, m, _growth if damped else _grown))
-    return found
+        for calm, grown, met in ((inner, outer, begins), (outer, inner, ends)):
+            if _grown(*calm, m) < 0 < _grown(*grown, m):
+                damped = _growth(*calm, m) < -rounding(calm[1])[m]
+                met.append(_between(at, calm, grown, m, _growth if damped else _grown))
+    return [_range(speed, ends) for speed in begins]
+
+
+def _range(speed: float, ends: Sequence[float]) -> dict[str, float]:
+    """A speed from which a vibration grows, with the next one beyond it until which it does, if there is one."""
+    beyond = [end for end in ends if end * speed > 0 and abs(end) > abs(speed)]
+    return {"speed": speed, "until": min(beyond, key=abs)} if beyond else {"speed": speed}
 
 
 def _crossings(at: AtSpeed, rows: Sequence[Row], m: int, measure: Measure) -> list[float]:
@@ -307,6 +315,11 @@ def _as_result(
     return Result(np.full(len(speeds), time), quantities, {}, attributes)
 
 
+def _unstable(limit: Mapping[str, Any]) -> str:
+    """From where a vibration grows, and to where if that is known."""
+    return f"from {limit['speed']:.6g}" + (f" to {limit['until']:.6g}" if "until" in limit else "")
+
+
 def campbell_lines(result: Result) -> list[str]:
     """The table of a Campbell diagram: every vibration at the first, a middle and the last speed, critical speeds, limits."""
     a, speeds = result.attributes, result["speed"]
@@ -322,5 +335,5 @@ def campbell_lines(result: Result) -> list[str]:
     ]
     if not a["critical"]:
         lines.append(f"critical     none between {speeds[0]:.6g} and {speeds[-1]:.6g} rad/s")
-    lines += [f"unstable     from {one['speed']:.6g} rad/s: {one['mode']}" for one in a["limits"]]
+    lines += [f"unstable     {_unstable(one)} rad/s: {one['mode']}" for one in a["limits"]]
     return lines + [f"note         {note}" for note in a["notes"]]

@@ -13,7 +13,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ffr_dyn.analyses.integration import with_all_reactions
-from ffr_dyn.analyses.outcome import result_of, with_quantities
+from ffr_dyn.analyses.outcome import needed, result_of, with_quantities
 from ffr_dyn.analyses.registry import OfMoment, option
 from ffr_dyn.analyses.settings import MomentSettings
 from ffr_dyn.consistency.assemble import Assembled, assemble
@@ -119,7 +119,7 @@ def periodic(
     """
     require_scene(scene)
     assembled = assemble(scene, time=time)
-    selected(assembled.system, outputs)
+    selected(assembled.system, needed(scene, outputs))
     of, found = _found(assembled, time, method, period)
     record = _record(assembled, of, found)
     result = result_of(assembled.system, record, {}, None, outputs)

@@ -13,7 +13,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ffr_dyn.analyses.integration import with_all_reactions
-from ffr_dyn.analyses.outcome import result_of, with_quantities
+from ffr_dyn.analyses.outcome import needed, result_of, with_quantities
 from ffr_dyn.analyses.registry import OfMoment, option
 from ffr_dyn.analyses.settings import MomentSettings
 from ffr_dyn.consistency.assemble import Assembled, assemble, seen_in_space
@@ -93,7 +93,7 @@ def steady(
         found.append(pair)
         progress(len(found), max(1, len(values)))
     assembled = found[0][0]
-    selected(assembled.system, outputs)
+    selected(assembled.system, needed(scene, outputs))
     rows, notes, stable = [], list[str](), True
     for at, state in found:
         one = record_states(evaluator(at.system), np.array([time]), state.x[None], state.v[None])

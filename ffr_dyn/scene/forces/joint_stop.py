@@ -27,7 +27,8 @@ class JointStop(Force):
     joint : name of the joint
     coordinate : "angle" or "stroke"
     lower, upper : values of the coordinate where the stops begin [m]; default: no stop on that side
-    stiffness : [N/m];  damping : [N s/m], grows from zero over the depth `entry`
+    stiffness : [N/m];  damping : [N s/m], grows from zero over the depth `entry`,
+                as 3 u^2 - 2 u^3 of u = depth / entry
     entry     : [m] depth over which the stiffness grows from zero: the force is stiffness depth^2 / (2 entry) down to it,
                 stiffness (depth - entry / 2) below
     turns     : whole turns of an angle at the start

@@ -97,5 +97,7 @@ class Load(Force):
 
     def stays_in_plane(self, scene: Scene, normal: int) -> bool:
         k = self.place.axis_along(scene, normal)
-        across = [self.force[k], *(self.moment[c] for c in range(3) if c != k)]
-        return self.function is None and all(is_number(component) and component == 0 for component in across)
+        across = [k, *(3 + c for c in range(3) if c != k)]
+        timed = [(*self.force, *self.moment)[c] for c in across]
+        zero = across if self.function is None else getattr(self.function, "zero", ())  # what a formula knows of itself
+        return all(is_number(one) and one == 0 for one in timed) and set(across) <= set(zero)

@@ -9,9 +9,12 @@ import pytest
 from synthetic import cloud
 from test_analyses_kinematic import bar, slider_crank
 
+from ffr_dyn.analyses.efforts import JointEffort
 from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.analyses.inverse import Dynamic, QuasiStatic, inverse
 from ffr_dyn.analyses.kinematic import kinematic
+from ffr_dyn.analyses.mixed import mixed
+from ffr_dyn.analyses.static import static
 from ffr_dyn.functions.rotation import rotation_matrix
 from ffr_dyn.functions.time_functions import harmonic, polynomial
 from ffr_dyn.integrators import RK4
@@ -158,6 +161,26 @@ def test_work_of_the_drivers_is_the_change_of_energy():
     work = np.concatenate([[0], np.cumsum(2.5e-4 * (power[1:] + power[:-1]))])
     np.testing.assert_allclose(work, result["energy.total"] - result["energy.total"][0], atol=5e-4)
     assert np.abs(work).max() > 1
+
+
+@pytest.mark.parametrize("outputs", [("swing.effort",), ("*.effort",), ("swing.*",)])
+@pytest.mark.parametrize("analysis", ["kinematic", "static", "dynamic", "quasi-static", "mixed"])
+def test_efforts_that_every_result_has_may_be_asked_for(analysis, outputs):
+    """They were none of the quantities of a scene, and refused."""
+    one, span = arm("revolute"), {"end": 0.02, "output_step": 0.01}
+    scene = replace(one, drivers=(Driver("swing", "joint0", MOTION),))
+    force = JointEffort("torque", "joint0")
+    result = {
+        "kinematic": lambda: kinematic(scene, outputs=outputs, **span),
+        "static": lambda: static(scene, outputs=outputs),
+        "dynamic": lambda: inverse(scene, outputs=outputs, **span),
+        "quasi-static": lambda: inverse(scene, elastic=QuasiStatic(), outputs=outputs, **span),
+        "mixed": lambda: mixed(scene, unknown=(force,), outputs=(*outputs, "torque.effort", "torque.power"), **span),
+    }[analysis]()
+    assert "swing.effort" in result
+    assert "joint0.force" not in result
+    with pytest.raises(InputError, match=r"outputs: 'sway\.effort' is none of the scene's quantities"):
+        static(scene, outputs=("sway.effort",))
 
 
 def test_bad_input():

@@ -345,3 +345,15 @@ def test_a_joint_that_slides_along_a_flexible_body_is_named():
     assert "joint 'slide' slides along body 'guide' by the straight axis of its interface 'a'" in note
     for scene in (sliding(model, "revolute", tuple(along)), sliding(bar("stiff"), "cylindrical", (1, 0, 0))):
         assert not [n for n in assemble(scene).notes if "slides along" in n]
+
+
+@pytest.mark.parametrize(("markers", "told"), [(("guide.a", "slider.a"), 1), (("slider.a", "guide.a"), 0)])
+def test_the_line_of_a_point_on_it_is_that_of_the_first_body(markers, told):
+    """The end of a bar that rolls along the ground slides along no bar, however this lies."""
+    model = cloud(3)
+    along = model.interface("b").position - model.interface("a").position
+    scene = sliding(model, "revolute", (0, 0, 1))
+    i, j = markers
+    roller = Joint("roller", "point-on-line", i, j, axis=tuple(along / np.linalg.norm(along)))
+    notes = assemble(replace(scene, joints=(scene.joints[0], roller))).notes
+    assert len([note for note in notes if "slides along" in note]) == told

@@ -13,13 +13,15 @@ import ffr_dyn as fd
 import ffr_prep as fp
 from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.consistency.assemble import assemble, flat_form, flattened
+from ffr_dyn.functions.formula import parse
 from ffr_dyn.functions.rotation import euler_parameters, rotation_matrix
-from ffr_dyn.functions.time_functions import harmonic, polynomial
+from ffr_dyn.functions.time_functions import constant, harmonic, polynomial
 from ffr_dyn.integrators import RK4, ROS2
 from ffr_dyn.scene.drivers import Driver
 from ffr_dyn.scene.forces import Load, SpringDamper
 from ffr_dyn.scene.joints import Joint, frames
 from ffr_dyn.scene.scene import Body, Scene
+from ffr_dyn.scene_file.state_formula import StateFormula
 from ffr_dyn.variants.variant import with_basis
 from ffr_prep.body import rigid_body
 from ffr_prep.common.errors import InputError
@@ -277,6 +279,37 @@ def test_rounding_of_high_modes_does_not_make_a_scene_spatial(link):
         np.testing.assert_allclose(runs[0][name], runs[1][name], rtol=0, atol=1e-9 * np.abs(runs[1][name]).max())
 
 
+@pytest.mark.parametrize("stiffening", [False, True], ids=["linear", "second order"])
+def test_a_force_sees_the_elastic_coordinates_that_its_body_has(stiffening):
+    """Of linear bodies it had those of the modes that stay in the plane alone, counted anew: of another mode, or of none."""
+    model, seen = rod("rod", 1.0, stiffening=stiffening), []
+
+    def push(t, state):
+        seen.append((state.q("one"), state.q_dot("two")))
+        return 5.0 - 2e4 * state.q("one") @ np.arange(model.n)
+
+    scene = double_pendulum(model, forces=(fd.Actuator("push", "hip", function=push),))
+    runs = [
+        integrate(replace(scene, plane=plane), end=0.02, output_step=0.005, method=ROS2(1e-4))
+        for plane in ("auto", "none")
+    ]
+    assert [run.attributes["computed"][:12] for run in runs] == ["in the plane", "in space, as"]
+    assert {part.size for parts in seen for part in parts} == {model.n}
+    largest = np.abs(runs[1]["push.torque"] - 5.0).max()
+    assert largest > 1e-3
+    np.testing.assert_allclose(runs[0]["push.torque"], runs[1]["push.torque"], rtol=0, atol=1e-8 * largest)
+
+
+@pytest.mark.parametrize(
+    ("component", "said"), [(0, "in the plane, normal z"), (5, "in the plane, normal z"), (2, "'drag' may act")]
+)
+def test_formulas_of_the_motion_keep_to_the_plane_where_they_have_no_component_across_it(link, component, said):
+    formulas = [constant(0.0)] * 6
+    formulas[component] = parse("-0.1 * two.b.velocity.x", {}, "")
+    drag = Load("drag", "two.b", function=StateFormula(tuple(formulas)))
+    assert said in flat_form(double_pendulum(link, loads=(drag,)), 0.0).computed
+
+
 @pytest.mark.parametrize(("angle", "plane"), [(1e-12, "z"), (1e-7, "none"), (1e-3, "none")])
 def test_a_body_that_is_really_spatial_stays_so(link, angle, plane):
     assert flattened(double_pendulum(turned_modes(link, angle)), 0.0)[0].plane == plane
@@ -370,6 +403,14 @@ def test_bores_a_hair_off_are_in_the_plane(plane, beside):
         for scene in (linkage(side, plane=plane), linkage(0 * side))
     ]
     np.testing.assert_allclose(runs[0][:, :2], runs[1][:, :2], atol=1e-9)
+    # What looks at it in space has its places in the plane as well; redundant joints could not be closed.
+    assert fd.mobility(linkage(side, plane=plane)).rigid == 0
+    held, still = (fd.static(scene)["o.moment"] for scene in (linkage(side, plane=plane), linkage(0 * side)))
+    np.testing.assert_allclose(held, still, atol=1e-5)
+    driven = fd.inverse(linkage(side, plane=plane), end=0.02, output_step=0.01, elastic=fd.QuasiStatic())
+    swinging = fd.linearise(replace(linkage(side, plane=plane), drivers=()))
+    assert np.isfinite(driven["motor.effort"]).all()
+    assert len(swinging.eigenvalues) == 2
 
 
 @pytest.mark.parametrize(
