@@ -9,6 +9,7 @@ import pytest
 
 import ffr_prep as fp
 from ffr_dyn.analyses.integration import integrate
+from ffr_dyn.analyses.rotating.response import response
 from ffr_dyn.analyses.settings import Settings
 from ffr_dyn.analyses.static import static
 from ffr_dyn.consistency.assemble import assemble, flattened
@@ -96,6 +97,24 @@ def test_what_shapes_leave_out_of_them_is_told(boom, measurement):
     notes = assemble(swinging(boom, measurements=(measurement,))).notes
     assert any("'boom': its shapes leave out stress of its own inertia" in note for note in notes)
     assert not any("leave out" in note for note in assemble(swinging(boom, measurements=())).notes)
+
+
+def clamped(boom, what, weight):
+    """Shaken up and down, its stress at the clamp told as `what`."""
+    notch = StressMeasurement("notch", "boom", EDGE, what=what)
+    clamp = (Joint("clamp", "fixed", "ground.O", "boom.root"),)
+    scene = swinging(boom, joints=clamp, drivers=(), measurements=(notch,), gravity=(0, -weight, 0))
+    found = response(scene, input="base.y", outputs=["measured.notch"], frequencies=[5.0], about="equilibrium")
+    return found["gain"][0, 0]
+
+
+@pytest.mark.parametrize("what", ["von-mises", "tresca", "max-principal", "min-principal"])
+def test_sizes_of_stress_have_slopes_where_there_is_some(boom, what):
+    """Where there is none, as where nothing weighs, they go up both ways, and the mean of both slopes is nothing."""
+    with pytest.raises(InputError, match=r"'measured\.notch' is 0 here and has no slope"):
+        clamped(boom, what, weight=0.0)
+    gain = 0.0 if what == "min-principal" else clamped(boom, "xx", weight=9.81)
+    assert clamped(boom, what, weight=9.81) == pytest.approx(gain, rel=1e-4)
 
 
 @pytest.mark.parametrize("beyond", [1e-4, 0.01])
