@@ -43,6 +43,18 @@ def steady_stress_doubt(provenance: Mapping[str, Any]) -> str | None:
     )
 
 
+def of_plane(provenance: Mapping[str, Any], k: int) -> Mapping[str, Any]:
+    """The provenance of a body that moves in the plane across its axis k alone: other accelerations, which it never has,
+    leave out nothing."""
+    kept = provenance.get(STEADY_STRESS)
+    if not kept:
+        return provenance
+    along, about = [axis != k for axis in range(3)], [axis == k for axis in range(3)]
+    acting = [*along, *about, *about, *[False] * 3]
+    left_out = [out if acts else 0.0 for out, acts in zip(kept["left_out"], acting, strict=True)]
+    return {**provenance, STEADY_STRESS: {**kept, "left_out": left_out}}
+
+
 def shear_doubt(provenance: Mapping[str, Any]) -> str | None:
     """The warning about a body with stress in which beams have sections that do not know their shear; None of others."""
     sections = provenance.get(WITHOUT_SHEAR, [])

@@ -99,6 +99,23 @@ def test_what_shapes_leave_out_of_them_is_told(boom, measurement):
     assert not any("leave out" in note for note in assemble(swinging(boom, measurements=())).notes)
 
 
+@pytest.mark.parametrize("parts", [None, 2])
+@pytest.mark.parametrize("relief", [False, True])
+def test_of_what_shapes_leave_out_a_run_tells_what_its_motion_can_load(parts, relief):
+    """In the plane nothing weighs or turns across it; of a body in parts the one that is measured tells."""
+    member = Member(rectangle(0.013, 0.02), Material("aluminium", 7e10, 0.3, 2700.0), orientation=(0, 1, 0))
+    frame = named(polyline([(0, 0, 0), (1.0, 0, 0)], member, elements=8), root=(0, 0, 0), tip=(1.0, 0, 0))
+    model = fp.from_frame(frame, [InterfaceRegion("root"), InterfaceRegion("tip")])
+    shapes = fp.Union((CraigBampton(2), fp.InertiaRelief())) if relief else CraigBampton(2)
+    request = fp.Request(name="boom", reference=FixedTo("root"), reduction=shapes, stress=True, parts=parts)
+    pull = SectionMeasurement("pull", "boom", (0.4, 0, 0), what="force")
+    scene = swinging(fp.reduce(model, request), measurements=(pull,), plane="z")
+    told = "".join(note for note in assemble(scene).notes if "leave out stress" in note)
+    assert ("under spin about z" in told) is not relief
+    assert "along z" not in told
+    assert "spin about y" not in told
+
+
 def clamped(boom, what, weight):
     """Shaken up and down, its stress at the clamp told as `what`."""
     notch = StressMeasurement("notch", "boom", EDGE, what=what)
