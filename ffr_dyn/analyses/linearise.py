@@ -27,7 +27,7 @@ from ffr_dyn.compile.structure import Structure
 from ffr_dyn.consistency.assemble import assemble, seen_in_space
 from ffr_dyn.consistency.doubts import KINK, checked
 from ffr_dyn.consistency.evaluation import Evaluator, evaluate, evaluator
-from ffr_dyn.consistency.kinks import kinked_forces
+from ffr_dyn.consistency.kinks import check_sizes, kinked_forces
 from ffr_dyn.consistency.tangent import STEP, Chart, at_rest, chart, derivative, rates, sizes, state, state_matrix
 from ffr_dyn.equations.forces import At
 from ffr_dyn.equations.layout import to_global_axes
@@ -451,7 +451,9 @@ def _output_matrices(
 
     turns, here = np.array([name.endswith(".angle") for name in outputs]), np.zeros(len(outputs))
     here = measured(near, np.zeros(2 * d))  # angles are told within half a turn; these go on from here
-    C, _ = derivative(lambda deviation: measured(near, deviation), np.concatenate([near.steps, near.steps]))
+    steps = np.concatenate([near.steps, near.steps])
+    C, _ = derivative(lambda deviation: measured(near, deviation), steps)
+    check_sizes(near.at.system.scene, outputs, lambda deviation: measured(near, deviation), C, steps)
     return C, _columns(lambda u: measured(_fed(near, scene, inputs, u), np.zeros(2 * d)), amounts)
 
 

@@ -28,7 +28,7 @@ from ffr_dyn.equations.layout import Layout, initial_state, length_of
 from ffr_dyn.functions.overshoots import overshoots
 from ffr_dyn.scene.followed import TURN
 from ffr_dyn.scene.force_kinds import forces_of
-from ffr_dyn.scene.scene import Scene, altered, require_scene
+from ffr_dyn.scene.scene import Scene, altered, measured_body, require_scene
 from ffr_dyn.scene.sensors import Measurement
 from ffr_dyn.variants.aligned import levelled
 from ffr_dyn.variants.mean_axis import in_mean_axis_frames
@@ -123,9 +123,9 @@ def assemble(scene: Scene, *, time: float = 0.0) -> Assembled:
 def body_doubts(scene: Scene) -> list[str]:
     """Notes on bodies: a mesh too coarse, a measured stress or section force that lacks that of inertia, numbers that cannot
     be meant."""
-    measured = {of.body for of in scene.measurements if not isinstance(of, Measurement)}
+    measured = {measured_body(scene, of) for of in scene.measurements if not isinstance(of, Measurement)}
     doubts = [(body.name, mesh_doubt(body.model.provenance)) for body in scene.bodies]
-    stressed = [body for body in scene.bodies if body.name in measured]
+    stressed = [scene.bodies[b] for b in sorted(measured)]
     doubts += [(b.name, of(b.model.provenance)) for b in stressed for of in (steady_stress_doubt, shear_doubt)]
     doubts += [(body.name, doubt) for body in scene.bodies for doubt in units_doubts(body.model)]
     return [f"body {name!r}: {doubt}" for name, doubt in doubts if doubt] + _gravity_doubts(scene)

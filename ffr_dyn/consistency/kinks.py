@@ -1,16 +1,17 @@
-"""Forces that have a kink, or jump, at the state that is linearised: on its two sides their slopes differ.
+"""Forces and outputs that have a kink, or jump, at the state that is linearised: on its two sides their slopes differ.
 
 Such are a stop whose edge is just touched, a servo just at its limit, the corner of a tabulated spring at its free length, a
 cable that is just taut. Small motions about the state are then not linear, however small they are, and the slope by central
 differences, the mean of both sides, belongs to neither.
 
-Slopes are looked at along what a law is a function of: the coordinates of its place and their rates, and the motions and
-velocities of all bodies where it looks at the state.
+Slopes of forces are looked at along what a law is a function of: the coordinates of its place and their rates, and the
+motions and velocities of all bodies where it looks at the state. Those of outputs that are sizes, as von Mises stress is, are
+looked at along one way by which all coordinates move.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -26,7 +27,10 @@ from ffr_dyn.functions.differences import NOT_DEFINED
 from ffr_dyn.scene.force_kinds import forces_of
 from ffr_dyn.scene.forces.force import Force
 from ffr_dyn.scene.forces.places import AtMarker, OnBody
+from ffr_dyn.scene.scene import Scene
+from ffr_dyn.scene.stress_sensors import MEASURES
 from ffr_prep.common.arrays import Array
+from ffr_prep.common.errors import InputError
 
 STEP = 1e-6  # m, rad, m/s, rad/s: how near a kink is at the state
 SMALLER = 0.1  # by which the step becomes smaller: a smooth slope then changes by as much less
@@ -34,6 +38,8 @@ KEPT = 0.5  # of the change of a slope by a kink, in spite of that
 BENT = 1e-3  # of a slope: a change by a kink that counts; and as good as none, as before a stop that begins softly
 ROUNDING = 64 * np.finfo(float).eps  # of forces, over the step
 POSITION, VELOCITY = "position", "velocity"
+MISFIT = 0.01  # of the change of an output: from where on slopes do not give it
+NEARER = (1e-3, 1e-4)  # of the steps by which slopes were found
 
 
 def kinked_forces(now: At) -> list[str]:
@@ -108,3 +114,26 @@ def _bend(function: Callable[[Array], Any], here: Array, step: Array) -> tuple[A
     sides = np.abs(ahead - here) / h, np.abs(here - behind) / h
     size = np.maximum(np.maximum(np.abs(ahead), np.abs(behind)), np.abs(here))
     return np.abs(ahead + behind - 2.0 * here) / h, np.maximum(*sides), np.minimum(*sides), ROUNDING * size / h
+
+
+def check_sizes(
+    scene: Scene, outputs: Sequence[str], measured: Callable[[Array], Array], C: Array, steps: Array
+) -> None:
+    """InputError for an output that is a size and does not change by its slopes; outputs (O,) are measured at a deviation
+    (S,) and have the slopes C (O, S)."""
+    sizes = {f"measured.{one.name}": one.what for one in scene.measurements if one.what in ("distance", *MEASURES)}
+    if sizes.keys().isdisjoint(outputs):
+        return
+    here, way = measured(np.zeros(steps.size)), steps * np.cos(1.0 + np.arange(steps.size))
+    kinked = np.ones(len(outputs), bool)
+    for share in NEARER:
+        change, told = measured(share * way) - here, share * (C @ way)
+        size = np.abs(change) + share * (np.abs(C) @ np.abs(way))
+        kinked &= np.abs(change - told) > MISFIT * size + 64 * np.finfo(float).eps * np.abs(here)
+    for name, value, kink in zip(outputs, here, kinked, strict=True):
+        if kink and name in sizes:
+            raise InputError(
+                f"output {name!r} is {value:.3g} here and has no slope: small motions in opposite ways do not change "
+                f'{sizes[name]} by opposite amounts. Take components, which have slopes (what = "stress", "xx", "position"), '
+                "or the motion itself with `run`"
+            )

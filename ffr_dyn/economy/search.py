@@ -359,8 +359,8 @@ def _finished(ledger: Ledger, found: Chosen, verify: bool | None) -> Economy:
 
 def _notes(ledger: Ledger, final: Trial) -> list[str]:
     """Those of the final run; on bodies those of the full model, since what the chosen one leaves out has an error here."""
-    own = body_doubts(final.scene)
-    return [*(note for note in final.result.attributes["notes"] if note not in own), *body_doubts(ledger.scene)]
+    own, full = (body_doubts(assemble(scene).system.scene) for scene in (final.scene, ledger.scene))  # as of runs
+    return [*(note for note in final.result.attributes["notes"] if note not in own), *full]
 
 
 def _everything_in_space(found: Chosen, final: Trial) -> Choice:

@@ -19,7 +19,7 @@ from ffr_dyn.equations.inertia import gravity_force
 from ffr_dyn.equations.kinematics import body_state, marker_point, marker_turn
 from ffr_dyn.equations.layout import Layout
 from ffr_dyn.equations.state_view import StateView
-from ffr_dyn.functions.rotation import rotation_matrix
+from ffr_dyn.functions.rotation import axis_times_sine, rotation_matrix
 from ffr_dyn.functions.time_functions import as_time_function, evaluate
 from ffr_dyn.scene.force_kinds import forces_of
 from ffr_dyn.scene.forces.force import Force
@@ -183,6 +183,8 @@ def _rotations(now: At, place: BetweenAxes) -> list[Row]:
     B = [[_product(now, DOT_1, a, b, place) for b in place.on_j.T] for a in place.on_i.T]
     z = [_mixed([(0.5, B[(c + 2) % 3][(c + 1) % 3]), (-0.5, B[(c + 1) % 3][(c + 2) % 3])]) for c in range(3)]
     trace = _mixed([(1.0, B[c][c]) for c in range(3)])
+    axial = axis_times_sine(np.array([[row.Phi for row in rows] for rows in B]))
+    z = [replace(row, Phi=float(value)) for row, value in zip(z, axial, strict=True)]
     s, cosine = float(np.linalg.norm([row.Phi for row in z])), (trace.Phi - 1) / 2
     g, g_s, g_c = stretch(s, cosine)
     growth = _mixed([*((g_s * row.Phi, row) for row in z), (g_c / 2, trace)])  # its rate and gradient are those of g
@@ -207,8 +209,9 @@ def _mixed(terms: list[tuple[float, Row]]) -> Row:
 
 def stretch(s: float, c: float) -> tuple[float, float, float]:
     """g = phi / s with phi = atan2(s, c), (dg/ds) / s, dg/dc; by series where s is small."""
-    square, y = s**2 + c**2, s / c
-    if c > 0 and y < 0.02:
+    square = s**2 + c**2
+    if s < 0.02 * c:
+        y = s / c
         series = (1 - y**2 / 3 + y**4 / 5 - y**6 / 7) / c
         return series, (-2 / 3 + 4 * y**2 / 5 - 6 * y**4 / 7) / c**3, -1 / square
     phi = float(np.arctan2(s, c))

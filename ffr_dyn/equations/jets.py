@@ -10,11 +10,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ffr_dyn.functions.rotation import skew
+from ffr_dyn.functions.rotation import axis_times_sine, skew
 from ffr_dyn.scene.forces.places import AlongLine, BetweenAxes, OnJoint, Place
 from ffr_dyn.scene.joints import COINCIDENCE, DISTANCE, DOT_1, DOT_2, DRIVEN_ANGLE, Word
 from ffr_dyn.scene.scene import Scene
@@ -181,6 +181,8 @@ def _rotation_vector(at: Pair, place: BetweenAxes) -> list[Jet]:
     """psi = g z, z the axial vector of the relative rotation B, g = phi / sin(phi) a function of c = cos(phi)."""
     B = [[dot(at.axis_i(a), at.axis_j(b)) for b in place.on_j.T] for a in place.on_i.T]
     z = [(B[(k + 2) % 3][(k + 1) % 3] - B[(k + 1) % 3][(k + 2) % 3]) * 0.5 for k in range(3)]
+    axial = axis_times_sine(np.array([[jet.value for jet in row] for row in B]))
+    z = [replace(jet, value=value) for jet, value in zip(z, axial, strict=True)]
     trace = B[0][0] + B[1][1] + B[2][2]
     s = float(np.linalg.norm([row.value for row in z]))
     g = composed(*_growth(s, 0.5 * (float(trace.value) - 1.0)), (trace * 0.5,))

@@ -15,6 +15,7 @@ from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 
 _TURNED = 1e6  # rad; beyond, the last digits of an angle are coarser than any drawing
+_LEAST_SINE = 1e-16  # of a turn that is taken for half a one
 
 
 def skew(a: Array) -> Array:
@@ -36,6 +37,18 @@ def rotation_matrix(p: Array) -> Array:
         return np.array(_rotation_rows(*p.tolist()))
     axes = (*range(2, p.ndim + 1), 0, 1)
     return np.array(_rotation_rows(p[..., 0], p[..., 1], p[..., 2], p[..., 3])).transpose(axes)
+
+
+def axis_times_sine(B: Array) -> Array:
+    """z (3,), the axis times the sine of the angle of a rotation B (3, 3).
+
+    Half a turn has no sine, and an axis n by B + 1 = 2 n n^T: it has that times a least sine.
+    """
+    z = 0.5 * np.array([B[2, 1] - B[1, 2], B[0, 2] - B[2, 0], B[1, 0] - B[0, 1]])
+    if np.trace(B) > 0 or np.linalg.norm(z) > _LEAST_SINE:
+        return z
+    n = (B + np.eye(3))[:, np.argmax(np.diag(B))]
+    return np.asarray(_LEAST_SINE * n / np.linalg.norm(n))
 
 
 def _rotation_rows(p0: Any, p1: Any, p2: Any, p3: Any) -> list[list[Any]]:

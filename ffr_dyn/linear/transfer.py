@@ -32,6 +32,7 @@ ON = 1e-9  # of a pole: how near to i w it is on it
 CIRCLE = 32  # points around a pole
 HIGHEST = 4  # order of a pole: two of a free motion, two of a motion that is prescribed
 PRINCIPAL = 1e-7  # of the values around a pole: its principal part, if it is no rounding
+ROUNDING = 1e-12  # of the largest state: an output that is no more sees nothing of it
 
 
 @dataclass(frozen=True)
@@ -85,30 +86,47 @@ def _no_rounding(values: Array, known: Array) -> Array:
 
 
 def receptances(
-    A: Array, B: Array, C: Array, D: Array, frequencies: Array, order: int = 0, known: Array | None = None
+    A: Array,
+    B: Array,
+    C: Array,
+    D: Array,
+    frequencies: Array,
+    order: int = 0,
+    known: Array | None = None,
+    outputs: int | None = None,
 ) -> Array:
-    """(F, O) complex, the transfer function alone; of the input as in `transfer`. Infinite at a pole."""
+    """(F, O) complex, the transfer function alone; of the input as in `transfer`. Infinite at a pole.
+
+    outputs : of how many outputs the rows of C are, in turn: what is rounding is told by all of one; each its own if None
+    """
     H = _answers(A, B, C, D, 2j * np.pi * frequencies, order)
     known = np.zeros(0) if known is None else known
     for k, s in enumerate(2j * np.pi * frequencies):
         if (np.abs(s - known) <= ON * np.abs(s)).any():
-            H[k] = _around(A, B, C, D, s, order, known)
+            H[k] = _around(A, B, C, D, s, order, known, outputs)
     return H
 
 
 def _answers(A: Array, B: Array, C: Array, D: Array, s: Array, order: int) -> Array:
+    return (_states(A, B, s, order) @ C.T + _powers(s, B, order) @ D.T).astype(complex)
+
+
+def _states(A: Array, B: Array, s: Array, order: int) -> Array:
+    """(F, S) under the input."""
     one, powers = np.eye(len(A)), _powers(s, B, order)
-    H = np.array([C @ _answer(at * one - A, B @ u) + D @ u for at, u in zip(s, powers, strict=True)])
-    return H.reshape(s.size, len(C)).astype(complex)
+    x = np.array([_answer(at * one - A, B @ u) for at, u in zip(s, powers, strict=True)])
+    return x.reshape(s.size, len(A))
 
 
-def has_pole(A: Array, B: Array, C: Array, D: Array, pole: complex, order: int, known: Array) -> Array:
-    """(O,) whether an output answers without bound at an eigenvalue."""
-    found: Array = ~np.isfinite(_around(A, B, C, D, pole, order, known))
+def has_pole(A: Array, B: Array, C: Array, D: Array, pole: complex, order: int, known: Array, outputs: int) -> Array:
+    """(O,) whether rows of C answer without bound at an eigenvalue; `outputs` as of `receptances`."""
+    found: Array = ~np.isfinite(_around(A, B, C, D, pole, order, known, outputs))
     return found
 
 
-def _around(A: Array, B: Array, C: Array, D: Array, pole: complex, order: int, known: Array) -> Array:
+def _around(
+    A: Array, B: Array, C: Array, D: Array, pole: complex, order: int, known: Array, outputs: int | None = None
+) -> Array:
     """(O,) the transfer functions at an eigenvalue, by their means around it; infinite where they have a pole there."""
     values = np.linalg.eigvals(A)
     far = values[np.abs(values - pole) > FREE * np.abs(values).max(initial=0.0)]
@@ -116,9 +134,17 @@ def _around(A: Array, B: Array, C: Array, D: Array, pole: complex, order: int, k
     beside = np.abs(others - pole).min(initial=abs(pole) or np.inf)  # a motion that is prescribed has a pole at zero
     radius = 0.5 * (beside if beside < np.inf else 1.0)
     turn = np.exp(2j * np.pi * (np.arange(CIRCLE) + 0.5) / CIRCLE)
-    H = _answers(A, B, C, D, pole + radius * turn, order)
+    s = pole + radius * turn
+    x = _states(A, B, s, order)
+    H = x @ C.T + _powers(s, B, order) @ D.T
     principal = np.abs(np.array([turn**k @ H for k in range(1, HIGHEST + 1)])).max(axis=0) / CIRCLE
-    found: Array = np.where(principal > PRINCIPAL * np.abs(H).max(axis=0), np.inf, H.mean(axis=0))
+    count = H.shape[1] if outputs is None else outputs
+    alike = H.shape[1] // max(count, 1)
+    size = PRINCIPAL * np.abs(H).reshape(-1, count).max(axis=0)
+    of_states = (
+        ROUNDING * np.abs(C).reshape(alike, count, len(A)).max(axis=(0, 2), initial=0.0) * np.abs(x).max(initial=0.0)
+    )
+    found: Array = np.where(principal > np.tile(np.maximum(size, of_states), alike), np.inf, H.mean(axis=0))
     return found
 
 
@@ -154,11 +180,14 @@ def band(values: Array, low: float | None = None, high: float | None = None) -> 
     return found[(found >= first) & (found <= last)]
 
 
-def mean_square(A: Array, B: Array, C: Array, D: Array, psd: Array, order: int = 0) -> Array:
+def mean_square(
+    A: Array, B: Array, C: Array, D: Array, psd: Array, order: int = 0, known: Array | None = None
+) -> Array:
     """(O,) of the outputs under a noise, (K, 2) rising frequencies [Hz] and one-sided densities, linear in between: by
-    Gauss's formula between its frequencies, those of `band`, others beside resonances, and zero."""
+    Gauss's formula between its frequencies, those of `band`, others beside resonances, and zero. Eigenvalues that are known
+    without rounding leave out those of free motions, at which there is nothing to be seen but rounding."""
     f, density = psd.T
-    values = np.linalg.eigvals(A)
+    values = np.linalg.eigvals(A) if known is None else known
     ends = np.unique(np.concatenate([f, band(values, f[0] or BELOW * f[-1], f[-1]), _beside(values, f[0], f[-1])]))
     half, middle = 0.5 * np.diff(ends), 0.5 * (ends[1:] + ends[:-1])
     at, weight = np.polynomial.legendre.leggauss(GAUSS)

@@ -375,8 +375,7 @@ def _check_point_driver(scene: Scene, driver: PointDriver) -> None:
 def measured_body(scene: Scene, measurement: StressMeasurement | SectionMeasurement) -> int:
     """The body whose stress or section forces are measured; of a whole in parts the one nearest to the place."""
     parts = wholes(scene.bodies).get(measurement.body, [])
-    surfaces = [part.model.surface for part in parts]
-    nearest = nearest_surface(surfaces, measurement.point) if all(surfaces) else 0
+    nearest = nearest_surface(measurement, [part.model.surface for part in parts])
     name = parts[nearest].name if parts else measurement.body
     return body_number(scene, name, f"measurement {measurement.name!r}")
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from ffr_dyn.scene.sensors import SectionMeasurement, StressMeasurement
 from ffr_prep.body import SECTION_FORCES, BeamForces, QuadraticField, Surface, at_places, values
-from ffr_prep.common.arrays import Array, ArrayLike
+from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 
 TENSOR = ("xx", "yy", "zz", "xy", "xz", "yz")
@@ -125,10 +125,21 @@ def nearest_point(surface: Surface, position: Array, body: str) -> int:
     return point
 
 
-def nearest_surface(surfaces: Sequence[Surface], position: ArrayLike) -> int:
-    """The number of the surface with the point nearest to a position (3,) [m]; zero of none."""
-    distances = [np.linalg.norm(surface.points - np.asarray(position, float), axis=1).min() for surface in surfaces]
+def nearest_surface(measurement: StressMeasurement | SectionMeasurement, surfaces: Sequence[Surface | None]) -> int:
+    """The number of the surface that is nearest to what is measured, of a section that with the nearest beam element; zero of
+    none."""
+    position, section = np.asarray(measurement.point, float), isinstance(measurement, SectionMeasurement)
+    distances = [_from_surface(surface, position, section) for surface in surfaces]
     return int(np.argmin(distances)) if distances else 0
+
+
+def _from_surface(surface: Surface | None, position: Array, section: bool) -> float:
+    """[m] from a position (3,) to the points of a surface, or to the beam elements under it; infinite where it has none."""
+    if surface is None:
+        return np.inf
+    if not section:
+        return float(np.linalg.norm(surface.points - position, axis=1).min())
+    return np.inf if surface.beams is None else float(_from_elements(surface.beams, position).min())
 
 
 def _size(surface: Surface) -> float:
@@ -208,7 +219,12 @@ def _measured_section(measurement: SectionMeasurement, surface: Surface | None) 
 
 def nearest_element(beams: BeamForces, position: Array) -> int:
     """The beam element whose centroid line is nearest to a position (3,) [m] in the body frame."""
+    return int(np.argmin(_from_elements(beams, position)))
+
+
+def _from_elements(beams: BeamForces, position: Array) -> Array:
+    """(E,) [m] from the centroid line of each element to a position (3,)."""
     start, along = beams.positions[:, 0], beams.positions[:, 2] - beams.positions[:, 0]
     from_start = np.asarray(position, float) - start
     xi = np.clip(np.einsum("ec,ec->e", from_start, along) / np.einsum("ec,ec->e", along, along), 0.0, 1.0)
-    return int(np.argmin(np.linalg.norm(from_start - xi[:, None] * along, axis=1)))
+    return np.asarray(np.linalg.norm(from_start - xi[:, None] * along, axis=1))

@@ -25,7 +25,7 @@ from ffr_dyn.scene.own_frame import OwnFrame
 from ffr_dyn.scene.scene import Body, Scene, altered, body_normal, marker_number, undeformed, used_interfaces
 from ffr_dyn.variants.aligned import BESIDE, about_height, basis_in_plane, combined, height_of, levelled, size_of
 from ffr_dyn.variants.variant import with_basis, with_modes
-from ffr_prep.body import FlexibleBody, FrameMarker, Interface, axial, remembered
+from ffr_prep.body import FlexibleBody, FrameMarker, Interface, axial, of_plane, remembered
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 
@@ -338,7 +338,8 @@ def _flat(body: FlexibleBody, k: int, used: Sequence[str]) -> FlexibleBody:
     rP_dm[k, [a, b]] = height_of(body, k, tuple(used)) * P_dm[[a, b]]
     interfaces = tuple(_flat_marker(i, k) if i.name in used else i for i in body.interfaces)
     stiffening = None if body.stiffening is None else _matrices_in_plane(body.stiffening, _first_loads(body, used), k)
-    return replace(body, P_dm=P_dm, rP_dm=rP_dm, PP_dm=PP_dm, interfaces=interfaces, stiffening=stiffening)
+    made = replace(body, P_dm=P_dm, rP_dm=rP_dm, PP_dm=PP_dm, interfaces=interfaces, stiffening=stiffening)
+    return replace(made, provenance=of_plane(body.provenance, k))
 
 
 def _flat_marker(marker: Marker, k: int) -> Marker:

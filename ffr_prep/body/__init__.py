@@ -50,6 +50,7 @@ from ffr_prep.body.steady_stress import (
     largest_von_mises,
     left_out_stress,
     of_fewer_shapes,
+    of_plane,
     shear_doubt,
     steady_stress_doubt,
 )
@@ -94,6 +95,7 @@ __all__ = [
     "mesh_doubt",
     "mesh_errors_of",
     "of_fewer_shapes",
+    "of_plane",
     "pair_values",
     "reach_of",
     "recombined",

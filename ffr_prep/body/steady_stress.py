@@ -33,14 +33,26 @@ def steady_stress_doubt(provenance: Mapping[str, Any]) -> str | None:
     """The warning about a body whose shapes do not show the stress of its own inertia; None where they do."""
     kept = provenance.get(STEADY_STRESS, {"left_out": [], "largest": []})
     shares = [out / most if most else 0.0 for out, most in zip(kept["left_out"], kept["largest"], strict=True)]
-    worst = max(range(len(shares)), key=shares.__getitem__, default=0)
-    if not shares or shares[worst] < TOLD:
+    told = sorted((k for k, share in enumerate(shares) if share >= TOLD), key=lambda k: -shares[k])
+    if not told:
         return None
     return (
-        f"its shapes leave out stress of its own inertia: up to {100 * shares[worst]:.0f} % of the largest, under "
-        f"{_LOADS[worst]}; add the shapes of such loads (`--method craig-bampton --method inertia-relief`; "
-        "InertiaRelief() in a Union)"
+        "its shapes leave out stress of its own inertia: of the largest up to "
+        f"{', '.join(f'{100 * shares[k]:.0f} % under {_LOADS[k]}' for k in told)}; add the shapes of such loads "
+        "(`--method craig-bampton --method inertia-relief`; InertiaRelief() in a Union)"
     )
+
+
+def of_plane(provenance: Mapping[str, Any], k: int) -> Mapping[str, Any]:
+    """The provenance of a body that moves in the plane across its axis k alone: other accelerations, which it never has,
+    leave out nothing."""
+    kept = provenance.get(STEADY_STRESS)
+    if not kept:
+        return provenance
+    along, about = [axis != k for axis in range(3)], [axis == k for axis in range(3)]
+    acting = [*along, *about, *about, *[False] * 3]
+    left_out = [out if acts else 0.0 for out, acts in zip(kept["left_out"], acting, strict=True)]
+    return {**provenance, STEADY_STRESS: {**kept, "left_out": left_out}}
 
 
 def shear_doubt(provenance: Mapping[str, Any]) -> str | None:

@@ -17,6 +17,7 @@ _LIGHTEST = (
 )
 _FAR = 20.0  # diagonals of the body between it and a point that is attached to it
 _SPREAD = 100.0  # of the farthest point of a body without a shape, which its radius of gyration is not beyond
+_THIN = 1e-2  # kg/m^3 over the cube of the radius of gyration, below which an inertia in kg mm^2 is, and no rotor
 
 
 def units_doubts(body: FlexibleBody) -> list[str]:
@@ -58,7 +59,7 @@ def _of_points(body: FlexibleBody) -> Iterator[str]:
     reach = max(float(np.linalg.norm(interface.position - centre)) for interface in body.interfaces)
     second = float(np.trace(body.rr_dm)) / body.mass - float(centre @ centre)
     gyration = float(np.sqrt(max(second, 0.0)))
-    if reach > 0 and gyration > _SPREAD * reach:
+    if reach > 0 and gyration > _SPREAD * reach and body.mass < _THIN * gyration**3:
         yield (
             f"its radius of gyration is {gyration:.3g} m and its farthest point {reach:.3g} m from its centre: is the "
             "inertia in kg mm^2? It is in kg m^2"

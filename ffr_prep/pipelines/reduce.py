@@ -69,7 +69,7 @@ class Request:
     solver     : what factorises the stiffness and finds the modes
     provenance : JSON values kept with the body, beside what is recorded anyway
 
-    Raises InputError for a reference or reduction that is a name and not an object.
+    Raises InputError for a reference or reduction that is a name or a list and not an object.
 
     >>> request = fp.Request(name="rod", reference=fp.FixedTo("hinge"), reduction=fp.CraigBampton(8), stress=True)
     """
@@ -91,9 +91,9 @@ class Request:
             raise InputError(f"drawn_modes is {self.drawn_modes}; give 1 or more, or linear=True")
         for what, given, such in (
             ("reference", self.reference, 'FixedTo("root")'),
-            ("reduction", self.reduction, "CraigBampton(10)"),
+            ("reduction", self.reduction, "CraigBampton(10), or Union((CraigBampton(10), InertiaRelief()))"),
         ):
-            if isinstance(given, (str, type)):
+            if isinstance(given, (str, type, tuple, list)):
                 raise InputError(f"{what} is {given!r}; give one such as {such}")
 
 

@@ -20,7 +20,7 @@ from ffr_prep.reduction.responses import static_solver
 from ffr_prep.solvers.factor import FreeBody
 
 _KINDS = (3, 6)  # translation, angular acceleration, spin
-_SMALL = 0.01  # of the largest stress of a kind: loads that cause less are measured by it
+_ROUNDING = 1e-5  # of the largest stress of a kind: loads that cause less are measured by it
 _NOTHING = 1e-9
 
 
@@ -34,7 +34,7 @@ def steady_stress(model: Model, body: FreeBody, L: Array, basis: Basis) -> dict[
     largest = _largest_stress(model, exact)
     if largest is None:
         return {}
-    sizes = np.concatenate([np.maximum(part, _SMALL * part.max()) for part in np.split(largest, _KINDS)])
+    sizes = np.concatenate([np.maximum(part, _ROUNDING * part.max()) for part in np.split(largest, _KINDS)])
     found = {"left_out": _largest_stress(model, left_out), "largest": sizes}
     return {STEADY_STRESS: {key: [float(f"{x:.6g}") for x in np.asarray(of)] for key, of in found.items()}}
 

@@ -177,12 +177,13 @@ def _wave(
 
 
 def _motion(of: Wave, acts: Acting, at: Solution, names: Sequence[str]) -> Array:
-    """(ROWS, O) the outputs over a period, evenly, with what the base adds to those that are absolute."""
-    turning, record = period(of, at.u, float(np.exp(at.p)), ROWS)
+    """(T, O) the outputs after every step of a period, among which those they cover are found, with what the base adds to
+    those that are absolute."""
+    turning, record = period(of, at.u, float(np.exp(at.p)), of.of.steps)
     wanted = quantities_of(turning.near, tuple(names))
     result = result_of(turning.system, record, {}, outputs=("default", *wanted))
     values = np.stack([result[name] for name in names], axis=1)
-    phase = 2j * np.pi * np.arange(1, ROWS + 1) / ROWS
+    phase = 2j * np.pi * np.arange(1, of.of.steps + 1) / of.of.steps
     for k, name in enumerate(names):
         if (order := absolute_order(acts.effort, name)) is not None and (acts.order is not None or order == 2):
             rate = (2j * np.pi / turning.period) ** (order - (2 if acts.order is None else acts.order))
@@ -196,10 +197,9 @@ def _as_result(
 ) -> Result:  # fmt: skip
     frequency = np.exp(np.array([one.p for one in found]))
     growth = np.array([_growth(one) for one in found])
-    spectrum = (
-        np.fft.fft(motions, axis=1)[:, 1 : harmonics + 1] * 2 / ROWS
-    )  # of rows that begin a step after the period
-    spectrum = spectrum * np.exp(-2j * np.pi * np.arange(1, harmonics + 1) / ROWS)[:, None]
+    rows = motions.shape[1]  # which begin a step after the period
+    spectrum = np.fft.fft(motions, axis=1)[:, 1 : harmonics + 1] * 2 / rows
+    spectrum = spectrum * np.exp(-2j * np.pi * np.arange(1, harmonics + 1) / rows)[:, None]
     of, orders = Axis("of", tuple(name.replace(".", " ") for name in names)), Axis("order", _numbers(harmonics))
     first = np.degrees(np.unwrap(np.angle(1j * spectrum[:, 0]), axis=0))
     quantities = {

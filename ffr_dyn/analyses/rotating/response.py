@@ -13,7 +13,7 @@ from ffr_dyn.analyses.efforts import Effort
 from ffr_dyn.analyses.linearise import Linearisation, linearised
 from ffr_dyn.analyses.registry import OfMoment, option
 from ffr_dyn.analyses.rotating.inputs import Acting, absolute_order, acting, allowed, components, told
-from ffr_dyn.analyses.rotating.seen_from_ground import Sides, beside, outputs_over_turn, seen_from_ground
+from ffr_dyn.analyses.rotating.seen_from_ground import Sides, beside, outputs_over_turn, poles, seen_from_ground
 from ffr_dyn.analyses.rotating.steady import steady
 from ffr_dyn.analyses.rotating.without_bound import grows, notes_of_gains, notes_of_growth, under_noise
 from ffr_dyn.analyses.settings import MomentSettings
@@ -159,7 +159,7 @@ def response(
     f = asked if asked.size else band(linear.eigenvalues, low, high)
     if acts.order and not f.min() > 0:
         raise InputError(f"frequencies {list(frequencies)}: at 0 Hz a velocity has no displacement; give positive ones")
-    found = transfer(linear.A, linear.B, linear.C, linear.D, f, PARTS, acts.order or 0, linear.eigenvalues)
+    found = transfer(linear.A, linear.B, linear.C, linear.D, f, PARTS, acts.order or 0, poles(linear, sides))
     if sides is not None:
         some = f[:: max(1, f.size // 50)]
         linear = replace(linear, notes=(*linear.notes, *beside(linear, sides, some, linear.outputs, acts.order or 0)))
@@ -200,9 +200,9 @@ def _mean_square(linear: Linearisation, sides: Sides | None, noise: Array, order
     notes = notes_of_growth(linear, growing)
     if not noise.size:
         return np.zeros(0), notes
-    found = mean_square(linear.A, linear.B, linear.C, linear.D, noise, order)
+    found = mean_square(linear.A, linear.B, linear.C, linear.D, noise, order, linear.eigenvalues)
     if sides is not None:
-        more = mean_square(linear.A, linear.B, sides.C, sides.D, noise, order)
+        more = mean_square(linear.A, linear.B, sides.C, sides.D, noise, order, linear.eigenvalues)
         found = found + 2 * more.reshape(-1, found.size).sum(axis=0)
     infinite, why = under_noise(linear, sides, noise, order, growing)
     return np.where(infinite, np.inf, found), [*notes, *why]

@@ -90,11 +90,20 @@ def _over_turn(
     return (of if of.varies else None), bool(screws.rate)
 
 
+def poles(linear: Linearisation, sides: Sides | None) -> Array:
+    """Eigenvalues without rounding, with those of free motions, which the ground sees at multiples of the speed."""
+    if sides is None or not linear.free:
+        return linear.eigenvalues
+    most = len(sides.C) // (2 * len(linear.outputs))
+    return np.concatenate([linear.eigenvalues, 1j * sides.rate * np.arange(-most, most + 1)])
+
+
 def beside(linear: Linearisation, sides: Sides, frequencies: Array, outputs: Sequence[str], order: int) -> list[str]:
     """Notes on outputs that answer at other frequencies than that of the input."""
-    A, B = linear.A, linear.B
-    H = receptances(A, B, sides.C, sides.D, frequencies, order).reshape(frequencies.size, -1, 2, len(outputs))
-    own = np.abs(receptances(A, B, linear.C, linear.D, frequencies, order)).max(axis=0)
+    C, D, count = np.concatenate([linear.C, sides.C]), np.concatenate([linear.D, sides.D]), len(outputs)
+    every = receptances(linear.A, linear.B, C, D, frequencies, order, poles(linear, sides), count)
+    every = np.where(np.isfinite(every), every, 0.0)  # what has no bound is told elsewhere
+    own, H = np.abs(every[:, :count]).max(axis=0), every[:, count:].reshape(frequencies.size, -1, 2, count)
     most = np.maximum(*(np.abs(H[:, :, 0] + sign * H[:, :, 1]) for sign in (1j, -1j))).max(axis=(0, 1))
     return [
         f"{name} also answers at the frequency of the input plus and minus multiples of {sides.rate / (2 * np.pi):.5g} Hz, "

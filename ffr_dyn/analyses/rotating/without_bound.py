@@ -11,7 +11,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from ffr_dyn.analyses.linearise import Linearisation
-from ffr_dyn.analyses.rotating.seen_from_ground import Sides
+from ffr_dyn.analyses.rotating.seen_from_ground import Sides, poles
 from ffr_dyn.linear.transfer import FREE, ON, Transfer, has_pole
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.brief import listed
@@ -42,10 +42,20 @@ def notes_of_gains(linear: Linearisation, found: Transfer) -> list[str]:
     rows = np.flatnonzero(~np.isfinite(found.H).all(axis=1))
     said = [
         f"at {found.frequencies[k]:.5g} Hz there is no bound for {_names(linear, ~np.isfinite(found.H[k]))}: "
-        + ("nothing holds the motion" if found.frequencies[k] == 0 else "the vibration there has no damping")
+        + (
+            "nothing holds the motion"
+            if _is_free(linear, found.frequencies[k])
+            else "the vibration there has no damping"
+        )
         for k in rows
     ]
     return list(dict.fromkeys(said))[:3]
+
+
+def _is_free(linear: Linearisation, frequency: float) -> bool:
+    """Whether a gain without bound is that of a free motion: at zero, or where no vibration is, in step with the turning."""
+    s = 2j * np.pi * frequency
+    return not (np.abs(s - linear.eigenvalues) <= ON * np.abs(s)).any() or frequency == 0
 
 
 def under_noise(
@@ -53,15 +63,22 @@ def under_noise(
 ) -> tuple[Array, list[str]]:
     """(O,) of which outputs the mean square under a noise (K, 2) is infinite, and notes on why."""
     values, (low, high) = linear.eigenvalues, noise[[0, -1], 0]
-    bare = (values.imag > 0) & (np.abs(values.real) <= ON * np.abs(values))
-    inside = values[bare & (values.imag >= 2 * np.pi * low) & (values.imag <= 2 * np.pi * high)]
-    undamped, infinite = _seen(linear, sides, inside, order)
+    known = poles(linear, sides)
+    bare = (known.imag > 0) & (np.abs(known.real) <= ON * np.abs(known))
+    bare &= (known.imag >= 2 * np.pi * low) & (known.imag <= 2 * np.pi * high)
+    undamped, infinite = _seen(linear, sides, values[bare[: values.size]], order)
+    turning, beyond = _seen(linear, sides, known[values.size :][bare[values.size :]], order)
     notes = [
         f"the vibration of {value.imag / 2 / np.pi:.5g} Hz has no damping: noise excites it without bound, and the rms of "
         f"{_names(linear, infinite)} is infinite; give bodies or joints damping"
         for value in undamped[:1]
     ]
-    free = np.zeros(1 if low == 0 and (order or not values.all()) else 0)
+    notes += [
+        f"noise at {value.imag / 2 / np.pi:.5g} Hz, in step with the turning, drives what nothing holds ever farther: the "
+        f"rms of {_names(linear, beyond)} is infinite; hold the turning by a driver"
+        for value in turning[:1]
+    ]
+    free = np.zeros(1 if low == 0 and (order or not known.all()) else 0)
     drifting, far = _seen(linear, sides, free, order)
     notes += [
         f"noise down to 0 Hz drives what nothing holds ever farther: the rms of {_names(linear, far)} is infinite; let the "
@@ -69,17 +86,18 @@ def under_noise(
         for _ in drifting
     ]
     _, without = _seen(linear, sides, values[list(growing)], order)
-    return infinite | far | without, notes
+    return infinite | beyond | far | without, notes
 
 
-def _seen(linear: Linearisation, sides: Sides | None, poles: Array, order: int) -> tuple[list[complex], Array]:
-    """The poles that outputs have, and (O,) which outputs have any of them."""
+def _seen(linear: Linearisation, sides: Sides | None, at: Array, order: int) -> tuple[list[complex], Array]:
+    """Those of the poles `at` that outputs have, and (O,) which outputs have any of them."""
     C, D, count = linear.C, linear.D, len(linear.outputs)
     if sides is not None:
         C, D = np.concatenate([C, sides.C]), np.concatenate([D, sides.D])
-    found = [has_pole(linear.A, linear.B, C, D, pole, order, linear.eigenvalues) for pole in poles]
-    each = np.any(np.reshape(found, (len(poles), len(C) // count, count)), axis=1)
-    return [pole for pole, seen in zip(poles.tolist(), each, strict=True) if seen.any()], np.any(each, axis=0)
+    known = poles(linear, sides)
+    found = [has_pole(linear.A, linear.B, C, D, pole, order, known, count) for pole in at]
+    each = np.any(np.reshape(found, (len(at), len(C) // count, count)), axis=1)
+    return [pole for pole, seen in zip(at.tolist(), each, strict=True) if seen.any()], np.any(each, axis=0)
 
 
 def _names(linear: Linearisation, which: Array) -> str:

@@ -20,6 +20,8 @@ from ffr_dyn.kernels.simd.slices import part, vector_at
 from ffr_dyn.kernels.tables import BLOCK, END_I, END_J, LAW, MEASURED, OK, PLACE, Tables, Vector
 from ffr_dyn.kernels.vectors import add, cross, dot, get, put, scale, subtract, to_body
 
+LEAST_SINE = 1e-16  # of a turn that is taken for half a one
+
 
 @kernel
 def move_axes(frames, w, axes, i, j):
@@ -50,11 +52,30 @@ def half_axial(B):
 
 
 @kernel
+def unit(c):
+    return (1.0 if c == 0 else 0.0, 1.0 if c == 1 else 0.0, 1.0 if c == 2 else 0.0)
+
+
+@kernel
+def axis_times_sine(B):
+    """z of a rotation B. Half a turn has no sine, and an axis n by B + 1 = 2 n n^T: it has that times a least sine."""
+    z = half_axial(B)
+    if B[0, 0] + B[1, 1] + B[2, 2] > 0.0 or dot(z, z) > LEAST_SINE * LEAST_SINE:
+        return z
+    k = 0
+    for c in range(1, 3):
+        if B[c, c] > B[k, k]:
+            k = c
+    n = add((B[0, k], B[1, k], B[2, k]), unit(k))
+    return scale(LEAST_SINE / dot(n, n) ** 0.5, n)
+
+
+@kernel
 def stretch(s, c):
     """g = phi / s with phi = atan2(s, c), (dg/ds) / s and dg/dc."""
     square = s * s + c * c
-    y = s / c
-    if c > 0.0 and y < 0.02:
+    if s < 0.02 * c:
+        y = s / c
         y2 = y * y
         g = (1.0 - y2 * (1.0 / 3.0 - y2 * (1.0 / 5.0 - y2 / 7.0))) / c
         return g, -(2.0 / 3.0 - y2 * (4.0 / 5.0 - y2 * 6.0 / 7.0)) / (c * c * c), -1.0 / square
@@ -86,7 +107,7 @@ def measure_bushing(w, s, i, j, x):
         x[c] = dot(get(s.axes[0, 1], c), d)
         x[6 + c] = dot(get(s.axes[0, 2], c), d) + dot(get(s.axes[0, 1], c), dd)
     B, rate = s.turn[0], s.turn[1]
-    z, z_rate = half_axial(B), half_axial(rate)
+    z, z_rate = axis_times_sine(B), half_axial(rate)
     cosine, cosine_rate = 0.5 * (B[0, 0] + B[1, 1] + B[2, 2] - 1.0), 0.5 * (rate[0, 0] + rate[1, 1] + rate[2, 2])
     g, g_s, g_c = stretch(dot(z, z) ** 0.5, cosine)
     g_rate = g_s * dot(z, z_rate) + g_c * cosine_rate
@@ -171,11 +192,6 @@ def rotation_sides(w, s, i, j, turn, moment):
     weigh(z, g, g_s, g_c, moment, s.turn[2])
     side_i = turning_side(w, i, s.axes[0, 0], s.axes[1, 1], s.turn[2], False)
     return side_i, turning_side(w, j, s.axes[1, 0], s.axes[0, 1], s.turn[2], True)
-
-
-@kernel
-def unit(c):
-    return (1.0 if c == 0 else 0.0, 1.0 if c == 1 else 0.0, 1.0 if c == 2 else 0.0)
 
 
 @kernel

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 from test_hill import ACROSS, ALONG, ENDS, MASS, rotor
 
 import ffr_dyn as fd
@@ -162,3 +163,36 @@ def test_a_flat_shaft_in_supports_that_are_not_alike_answers_by_all_harmonics(fl
         expected.append(np.linalg.solve(A, np.eye(50)[24])[24:26])
     np.testing.assert_allclose(found["transfer"] @ [1, 1j], expected, atol=1e-9 * np.abs(expected).max())
     assert not any("harmonics" in note for note in found.attributes["notes"])
+
+
+def tilted(speed: float) -> fd.Scene:
+    """A rotor that nothing drives, about an axis that is none of the scene's: its free turning is one but for rounding."""
+    A = Rotation.from_rotvec((0.9, -0.4, 0.7)).as_matrix()
+    places = {"left": (0, 0, -0.3), "right": (0, 0, 0.1), "rim": (0.1, 0, 0.05)}
+    disc = fd.rigid_body("disc", mass=8.0, inertia=(0.3, 0.3, 0.4), points=places)
+    law = {"stiffness": (5e5, 5e5, 1e5, 0, 0, 0), "damping": (200, 200, 50, 0, 0, 0), "axes": A, "axes_j": np.eye(3)}
+    bearings = [fd.Bushing(side, f"ground.{side}", f"disc.{side}", **law) for side in ("left", "right")]
+    body = fd.Body("disc", disc, rotation=Rotation.from_matrix(A).as_rotvec(), omega_bar=(0, 0, speed))
+    return fd.Scene([body], forces=bearings, ground={name: tuple(A @ place) for name, place in places.items()})
+
+
+@pytest.mark.parametrize("speed", [188.0, -579.0])
+def test_at_the_speed_of_a_free_turning_that_nothing_excites_there_is_no_resonance(speed):
+    """Of its eigenvalues, multiples of the speed, rounding made a gain and an rms."""
+    own, band = abs(speed) / (2 * np.pi), np.linspace(5.0, 120.0, 2001)
+    how = {"input": "base.y", "outputs": ["left.force.x", "disc.right.acceleration.y"], "about": "steady"}
+    near = fd.response(tilted(speed), frequencies=[own * (1 - 1e-5), own, own * (1 + 1e-5)], **how)["gain"]
+    np.testing.assert_allclose(near[1], 0.5 * (near[0] + near[2]), rtol=1e-6)
+    found = fd.response(tilted(speed), frequencies=band, psd=[(5.0, 1.0), (120.0, 1.0)], **how)
+    rms = np.array(list(found.attributes["rms"].values()))
+    np.testing.assert_allclose(rms**2, np.trapezoid(found["density"], band, axis=0), rtol=1e-5)
+    assert not found.attributes["notes"]
+
+
+def test_noise_that_turns_what_nothing_holds_ever_farther_is_told():
+    """A force along the ground at the rim has a mean moment where it keeps step with the turning."""
+    outputs, noise = ["disc.omega_bar.z", "left.force.x"], [(5.0, 1.0), (60.0, 1.0)]
+    found = fd.response(tilted(188.0), input="disc.rim.force.y", outputs=outputs, psd=noise, about="steady").attributes
+    assert np.isfinite(list(found["rms"].values())).tolist() == [False, True]
+    (note,) = (note for note in found["notes"] if "ever farther" in note)
+    assert note.startswith("noise at 29.921 Hz, in step with the turning")

@@ -14,7 +14,7 @@ from unittest.mock import patch
 import h5py
 import numpy as np
 from ffr_gallery.bodies import bar, beam, pendulum
-from remedy import CLOUD, DOUBLE, DRIVEN, GROUND, HINGED, run
+from remedy import CLOUD, DOUBLE, DRIVEN, GROUND, HINGED, run, stressed
 from said import Case
 from synthetic import cloud
 from test_analyses_kinematic import slider_crank
@@ -342,6 +342,16 @@ MANY = [
 ]
 
 
+def notched(what: str) -> object:
+    """The slopes of the stress of a body that nothing strains."""
+    notch = fd.StressMeasurement("notch", "cloud", (0, 0, 0), what=what)
+    scene = replace(CLOUD, bodies=(Body("cloud", stressed(cloud(2))),), measurements=(notch,))
+    return linearise(scene, outputs=("measured.notch",))
+
+
+SEEN = [Case(p(notched, "von-mises"), p(notched, "xx"))]
+
+
 def stopped(step: float) -> Result:
     """A soft arm that falls on a hard stop: longer steps throw it into shapes that no arm has."""
     stop = JointStop("stop", "hinge0", stiffness=1e6, entry=1e-4, lower=-0.5)
@@ -349,4 +359,4 @@ def stopped(step: float) -> Result:
 
 
 BENT = [Case(p(stopped, 5e-3), p(stopped, 1e-4))]
-CASES = RESUMED + KNOWN + OTHER + MANY
+CASES = RESUMED + KNOWN + OTHER + MANY + SEEN

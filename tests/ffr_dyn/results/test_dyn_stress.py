@@ -358,6 +358,19 @@ def test_what_fewer_shapes_leave_out_is_told_by_the_body_that_has_them(few):
     assert not left_out_stress(truncated(whole, 0).provenance)
 
 
+@pytest.mark.parametrize("relief", [False, True])
+def test_what_shapes_leave_out_of_a_slender_bar_is_told_by_each_load(relief):
+    """Tension is a thousandth of the stress of bending under loads of the same size, and all there is of a bar that spins."""
+    member = Member(rectangle(0.001, 0.001), Material("steel", 2.1e11, 0.3, 7850.0), (0, 1, 0))
+    line = named(polyline([(0, 0, 0), (1.0, 0, 0)], member, elements=20), root=(0, 0, 0), tip=(1.0, 0, 0))
+    model = fp.from_frame(line, [InterfaceRegion("root"), InterfaceRegion("tip")])
+    shapes = Union((CraigBampton(6), InertiaRelief())) if relief else CraigBampton(6)
+    bar = fp.reduce(model, fp.Request(name="bar", reference=FixedTo("root"), reduction=shapes, stress=True))
+    told = steady_stress_doubt(bar.provenance) or ""
+    assert ("62 % under spin about y, 62 % under spin about z, 49 % under weight" in told) is not relief
+    assert "and z together" not in told
+
+
 def test_on_an_accelerated_base_what_is_missing_is_not_known():
     """A result does not keep the acceleration of its base, which loads the shapes as gravity does."""
     bar, hinge = relieved_bar(), (Joint("hinge", "revolute", "ground.O", "body.left"),)

@@ -9,7 +9,9 @@ import pytest
 
 import ffr_prep as fp
 from ffr_dyn.analyses.integration import integrate
+from ffr_dyn.analyses.rotating.response import response
 from ffr_dyn.analyses.settings import Settings
+from ffr_dyn.analyses.static import static
 from ffr_dyn.consistency.assemble import assemble, flattened
 from ffr_dyn.functions.time_functions import harmonic
 from ffr_dyn.integrators import ROS2
@@ -17,6 +19,7 @@ from ffr_dyn.integrators.stabilisation import Projection
 from ffr_dyn.results.file import load_result, save_result
 from ffr_dyn.results.stress import section_histories, stress_histories
 from ffr_dyn.scene.drivers import Driver
+from ffr_dyn.scene.forces import Load
 from ffr_dyn.scene.joints import Joint
 from ffr_dyn.scene.scene import Body, Scene
 from ffr_dyn.scene.sensors import Measurement, SectionMeasurement, StressMeasurement
@@ -94,6 +97,59 @@ def test_what_shapes_leave_out_of_them_is_told(boom, measurement):
     notes = assemble(swinging(boom, measurements=(measurement,))).notes
     assert any("'boom': its shapes leave out stress of its own inertia" in note for note in notes)
     assert not any("leave out" in note for note in assemble(swinging(boom, measurements=())).notes)
+
+
+@pytest.mark.parametrize("parts", [None, 2])
+@pytest.mark.parametrize("relief", [False, True])
+def test_of_what_shapes_leave_out_a_run_tells_what_its_motion_can_load(parts, relief):
+    """In the plane nothing weighs or turns across it; of a body in parts the one that is measured tells."""
+    member = Member(rectangle(0.013, 0.02), Material("aluminium", 7e10, 0.3, 2700.0), orientation=(0, 1, 0))
+    frame = named(polyline([(0, 0, 0), (1.0, 0, 0)], member, elements=8), root=(0, 0, 0), tip=(1.0, 0, 0))
+    model = fp.from_frame(frame, [InterfaceRegion("root"), InterfaceRegion("tip")])
+    shapes = fp.Union((CraigBampton(2), fp.InertiaRelief())) if relief else CraigBampton(2)
+    request = fp.Request(name="boom", reference=FixedTo("root"), reduction=shapes, stress=True, parts=parts)
+    pull = SectionMeasurement("pull", "boom", (0.4, 0, 0), what="force")
+    scene = swinging(fp.reduce(model, request), measurements=(pull,), plane="z")
+    told = "".join(note for note in assemble(scene).notes if "leave out stress" in note)
+    assert ("under spin about z" in told) is not relief
+    assert "along z" not in told
+    assert "spin about y" not in told
+
+
+def clamped(boom, what, weight):
+    """Shaken up and down, its stress at the clamp told as `what`."""
+    notch = StressMeasurement("notch", "boom", EDGE, what=what)
+    clamp = (Joint("clamp", "fixed", "ground.O", "boom.root"),)
+    scene = swinging(boom, joints=clamp, drivers=(), measurements=(notch,), gravity=(0, -weight, 0))
+    found = response(scene, input="base.y", outputs=["measured.notch"], frequencies=[5.0], about="equilibrium")
+    return found["gain"][0, 0]
+
+
+@pytest.mark.parametrize("what", ["von-mises", "tresca", "max-principal", "min-principal"])
+def test_sizes_of_stress_have_slopes_where_there_is_some(boom, what):
+    """Where there is none, as where nothing weighs, they go up both ways, and the mean of both slopes is nothing."""
+    with pytest.raises(InputError, match=r"'measured\.notch' is 0 here and has no slope"):
+        clamped(boom, what, weight=0.0)
+    gain = 0.0 if what == "min-principal" else clamped(boom, "xx", weight=9.81)
+    assert clamped(boom, what, weight=9.81) == pytest.approx(gain, rel=1e-4)
+
+
+@pytest.mark.parametrize("beyond", [1e-4, 0.01])
+def test_just_beyond_a_cut_sections_are_those_of_the_element_there(beyond):
+    """The nearest points of the surface are those of the cut, which both parts have."""
+    member = Member(rectangle(0.013, 0.02), Material("aluminium", 7e10, 0.3, 2700.0), orientation=(0, 1, 0))
+    frame = named(polyline([(0, 0, 0), (1.0, 0, 0)], member, elements=8), root=(0, 0, 0), tip=(1.0, 0, 0))
+    model = fp.from_frame(frame, [InterfaceRegion("root"), InterfaceRegion("tip")])
+    request = fp.Request(name="boom", reference=FixedTo("root"), reduction=CraigBampton(2), stress=True, parts=2)
+    section = SectionMeasurement("bending", "boom", (0.5 + beyond, 0, 0), place="first")
+    scene = Scene(
+        (Body("boom", fp.reduce(model, request)),),
+        (Joint("clamp", "fixed", "ground.O", "boom.root"),),
+        loads=(Load("push", "boom.tip", force=(0, 1.0, 0)),),
+        measurements=(section,),
+        ground={"O": (0, 0, 0)},
+    )
+    assert static(scene)["measured.bending"][0, 2] == pytest.approx(0.5, rel=1e-6)
 
 
 def test_they_have_units_and_are_saved(run, tmp_path):

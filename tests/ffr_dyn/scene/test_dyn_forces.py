@@ -13,6 +13,7 @@ from synthetic import cloud
 from test_dyn_kernels import chain, moved, random_state
 
 from ffr_dyn.analyses.integration import integrate
+from ffr_dyn.analyses.linearise import linearise
 from ffr_dyn.analyses.states import scene_at
 from ffr_dyn.compile.engine import evaluate_at, load_at, new_engine
 from ffr_dyn.compile.scene_tables import compile_scene
@@ -197,6 +198,28 @@ def test_the_rotation_of_a_bushing_is_the_rotation_vector(angle):
     np.testing.assert_allclose(
         alone(scene, x, np.zeros(6)).coordinate[3:], angle * axis, rtol=0, atol=1e-15 + 1e-13 * angle
     )
+
+
+@pytest.mark.parametrize("axis", np.vstack([np.eye(3), [0.6, 0.0, 0.8], [0.36, -0.48, 0.8]]))
+def test_a_bushing_may_be_turned_by_exactly_half_a_turn(axis):
+    """The axial vector vanishes without rounding, and the readable form and the compiled one know the axis all the same."""
+    half = Body("b", rigid_body("b", mass=1.0, inertia=[1, 1, 1], points={"p": (0, 0, 0)}), rotation=(0.0, *axis))
+    bearing = Bushing("f", "ground.o", "b.p", (2, 2, 2, 0, 0, 0), (1, 1, 1, 0, 0, 0))
+    scene = Scene((half,), forces=(bearing,), ground={"o": (0, 0, 0)})
+    x, v = np.array([0.1, 0.2, 0.3, *half.rotation]), np.arange(6.0)
+    twin, engine = alone(scene, x, v), new_engine(compile_scene(scene), x, v)
+    assert load_at(engine, 0.0, x, v) == OK
+    np.testing.assert_allclose(
+        np.outer(twin.coordinate[3:], twin.coordinate[3:]), np.pi**2 * np.outer(axis, axis), atol=1e-12
+    )
+    np.testing.assert_allclose(engine.work.loads.measured[3:6], twin.coordinate[3:], atol=1e-12)
+    np.testing.assert_allclose(engine.work.bodies.f, twin.generalised, atol=1e-12)
+    assert np.abs(twin.generalised[:3]).max() > 0.5
+    np.testing.assert_allclose(linearise(scene).frequencies[-3:], np.sqrt(2 - 0.25) / (2 * np.pi))
+
+
+def test_a_bushing_may_be_turned_by_exactly_a_quarter_turn():
+    np.testing.assert_allclose(stretch(1.0, 0.0), (np.pi / 2, -np.pi / 2, -1.0))
 
 
 @pytest.mark.parametrize("c", [0.6, 0.95, 1.0, 1.05])

@@ -94,3 +94,11 @@ def test_a_scene_tells_of_inertia_in_kg_mm2_and_of_gravity_in_mm_s2():
     assert "is the inertia in kg mm^2" in notes
     assert "gravity is 9810 m/s^2: is it in mm/s^2?" in notes
     assert "inertia in kg mm^2" in " ".join(fd.forward(scene, end=0.01, output_step=0.01).attributes["notes"])
+
+
+@pytest.mark.parametrize("eccentricity", [2e-5, 2e-4])
+def test_a_rotor_whose_points_are_all_at_its_axis_is_not_doubted(eccentricity):
+    """Between its unbalance and its radius lie more than three powers of ten."""
+    at = {"centre_of_mass": (eccentricity, 0, 0), "points": {"c": (0, 0, 0)}}
+    assert not fp.units_doubts(fd.rigid_body("disc", mass=2.0, inertia=(0.01, 0.01, 0.02), **at))
+    assert fp.units_doubts(fd.rigid_body("disc", mass=2.0, inertia=(1e4, 1e4, 2e4), **at))

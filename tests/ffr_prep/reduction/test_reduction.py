@@ -436,6 +436,7 @@ def test_a_basis_that_is_not_what_it_claims_is_refused(model):
         ({"interfaces": ("left",)}, r"write InterfaceRegion\('left'\)"),
         ({"reference": "mean-axis"}, "reference is 'mean-axis'; give one such as FixedTo"),
         ({"reduction": CraigBampton}, "reduction is .*; give one such as CraigBampton"),
+        ({"reduction": (CraigBampton(2), CraigBampton(3))}, r"give one such as .*, or Union\(\(CraigBampton\(10\), "),
     ],
 )
 def test_texts_and_classes_in_place_of_objects_are_refused(change, words):
