@@ -11,9 +11,9 @@ from scipy.sparse import block_diag, coo_array, csr_array
 from ffr_dyn.closing.constraints import Constraints, RowsAt, open_at, rows_at
 from ffr_dyn.closing.row_space import Matrix, smallest_solution
 from ffr_dyn.equations.inertia import kept_integrals, mass_matrix
-from ffr_dyn.equations.layout import Layout, length_of, meets, moved, to_global_axes
+from ffr_dyn.equations.layout import Layout, meets, moved, to_global_axes
 from ffr_dyn.scene.joints import DISTANCE
-from ffr_dyn.scene.scene import Body, Scene
+from ffr_dyn.scene.scene import Body, Scene, length_of
 from ffr_prep.body import remembered
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError

@@ -24,7 +24,7 @@ from ffr_dyn.consistency.held_frequencies import held_frequencies
 from ffr_dyn.consistency.sliding import sliding_notes
 from ffr_dyn.consistency.validity import deflections
 from ffr_dyn.equations.constraint_rows import Block, blocks_of
-from ffr_dyn.equations.layout import Layout, initial_state, length_of
+from ffr_dyn.equations.layout import Layout, initial_state
 from ffr_dyn.functions.overshoots import overshoots
 from ffr_dyn.scene.followed import TURN
 from ffr_dyn.scene.force_kinds import forces_of
