@@ -1011,6 +1011,7 @@ INPUT = [
         p(fd.piecewise, [0.0, 1.0, 2.0], [[1.0], [1.0, 2.0]]),
         p(fd.piecewise, [0.0, 1.0, 2.0], [[1.0, 0.0], [1.0, 2.0]]),
     ),
+    Case(lambda: fd.steady(EVENLY, speeds=5.0), lambda: fd.steady(EVENLY, speeds=[5.0])),  # type: ignore[arg-type]
 ]
 CASES, NAMES = numbered(
     {
