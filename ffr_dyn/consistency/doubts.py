@@ -13,6 +13,7 @@ from functools import partial
 
 import numpy as np
 
+from ffr_dyn.compile.memory import check_repeats
 from ffr_dyn.compile.scene_tables import System, of_time
 from ffr_dyn.consistency.assemble import Assembled
 from ffr_dyn.consistency.evaluation import evaluate, evaluator
@@ -127,8 +128,12 @@ def _size(scene: Scene) -> float:
 
 
 def look(seen: Seen, view: View) -> None:
-    """Take note of the rows that follow, whose violations are those of all rows, redundant ones included."""
+    """Take note of the rows that follow, whose violations are those of all rows, redundant ones included.
+
+    Raises InputError for Python functions that remember.
+    """
     system, rows, arrays = seen.assembled.system, view.record, seen.arrays
+    check_repeats(system.user, rows.time, rows.x, rows.v)
     arrays["bodies"][:] = np.maximum(arrays["bodies"], extremes(system, rows))
     arrays["x"][:] = rows.x[-1]
     worst = int(np.argmax(rows.violation[:, 0]))

@@ -1012,6 +1012,10 @@ INPUT = [
         p(fd.piecewise, [0.0, 1.0, 2.0], [[1.0, 0.0], [1.0, 2.0]]),
     ),
     Case(lambda: fd.steady(EVENLY, speeds=5.0), lambda: fd.steady(EVENLY, speeds=[5.0])),  # type: ignore[arg-type]
+    Case(
+        lambda: run(felt(lambda t, s, calls=[]: (0, calls.append(t) or len(calls), 0))),
+        lambda: run(felt(lambda t, s: (0, t, 0))),
+    ),
 ]
 CASES, NAMES = numbered(
     {
