@@ -58,14 +58,20 @@ def wheel(**more: object) -> fd.Scene:
     [
         (lambda t: 5 * t**2, "second derivative.*are needed"),
         (lambda t: (5 * t**2, 10 * t), "second derivative.*are needed"),
-        (lambda t: (5 * t**2, t, 10.0), "tells a rate of"),
     ],
-    ids=["value", "value and rate", "wrong rate"],
+    ids=["value", "value and rate"],
 )
 def test_a_driver_needs_its_derivatives(analysis, function, said):
     """Without them velocities and torques were those of a motion at rest."""
     with pytest.raises(fd.ComputationError, match=said):
         analysis(wheel(drivers=(fd.Driver("d", "axle", function),)), end=0.5, output_step=0.1)
+
+
+@pytest.mark.parametrize("rate", [lambda t: 0.1 * t, lambda t: 10 * np.degrees(t)])
+def test_a_driver_needs_its_own_rate(rate):
+    scene = wheel(drivers=(fd.Driver("d", "axle", lambda t: (5 * t**2, rate(t), 10.0)),))
+    with pytest.raises(fd.ComputationError, match="tells a rate of"):
+        fd.kinematic(scene, end=0.5, output_step=0.1)
 
 
 def test_a_servo_that_damps_needs_the_rate_of_its_target():
