@@ -16,7 +16,7 @@ from ffr_dyn.consistency.evaluation import Evaluator
 from ffr_dyn.equations.forces import At, applied_by
 from ffr_dyn.equations.layout import velocity_sizes
 from ffr_dyn.functions.operations import MULTIPLY
-from ffr_dyn.functions.time_functions import TimeFunction, constant, operation, piecewise
+from ffr_dyn.functions.time_functions import TimeFunction, constant, numbers_in, operation, piecewise
 from ffr_dyn.kernels.tables import LAW
 from ffr_dyn.scene.checks import check_marker, check_name, check_own_name
 from ffr_dyn.scene.force_kinds import forces_of
@@ -196,7 +196,7 @@ def recorded(times: Array, values: Array, *, rates: Array | None = None, degree:
     """
     from scipy.interpolate import PPoly, make_interp_spline
 
-    t, y = np.asarray(times, float), np.asarray(values, float)
+    t, y = numbers_in("times of a record", times), numbers_in("values of a record", values)
     if t.shape != y.shape or t.ndim != 1 or t.size <= degree or not (np.diff(t) > 0).all():
         raise InputError(f"a recorded history needs more than {degree} increasing times and as many values")
     if rates is None:

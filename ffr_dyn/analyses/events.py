@@ -13,9 +13,10 @@ a single moment catches vibration in some phase.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, replace
 from difflib import get_close_matches
+from numbers import Real
 from typing import Any, Literal
 
 import numpy as np
@@ -30,13 +31,14 @@ from ffr_dyn.consistency.step_error import Beside, StepError, step_errors
 from ffr_dyn.equations.state_view import StateView
 from ffr_dyn.integrators import ROS2, Integrator
 from ffr_dyn.kernels.tables import OK, Record
-from ffr_dyn.results.quantities import catalogue
+from ffr_dyn.results.quantities import Entry, catalogue
 from ffr_dyn.results.recorded_motion import View
 from ffr_dyn.results.result import Quantity, Result
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 
 WIDTH = 4 * np.finfo(float).eps  # of a step, and relative: what brentq can reach
+AT_ONCE = 1e-6  # of a step: moments that are nearer to each other are one
 ROUNDING = 1e-14  # of the times of a run: no moment is known better
 SHOWN = 3  # times in a note
 LEAST_BESIDE, BESIDE = 8, 0.05  # rows beside an event, and their part of all rows
@@ -71,8 +73,8 @@ class Event:
     def __post_init__(self) -> None:
         if self.direction not in ("rising", "falling", "either"):
             raise InputError(f"event {self.name!r}: direction is {self.direction!r}; it is rising, falling or either")
-        if not np.isfinite(self.value):
-            raise InputError(f"event {self.name!r}: the value is {self.value}; it must be finite")
+        if not isinstance(self.value, Real) or not np.isfinite(self.value):
+            raise InputError(f"event {self.name!r}: the value is {self.value!r}; it must be a finite number")
 
 
 # (record, memory of the rows before) -> (values (T,), memory): what an event looks at
@@ -91,6 +93,10 @@ class _Crossing:
     memory: Any
 
 
+# an event as plain data, its declaration, the row that follows it, and a row of its own
+_Located = tuple[dict[str, Any], Event, int, Record]
+
+
 class Watcher:
     """Looks for events in the rows of a run, one for each step. `found` lists them as plain data; `ended_by` is the name of
     the one that has ended the run."""
@@ -106,6 +112,9 @@ class Watcher:
         self.events, self.found = tuple(events), list[dict[str, Any]]()
         self.ended_by: str | None = None
         system = assembled.system
+        names = [event.name for event in self.events]
+        if again := [name for k, name in enumerate(names) if name in names[:k]]:
+            raise InputError(f"there are two events {again[0]!r}; give each a name of its own")
         self._seen = [_seen(system, event) for event in self.events]
         self._system, self._method, self._gains, self._spacing = system, method, gains, spacing
         self._memory: list[Any] = [None] * len(self.events)
@@ -122,19 +131,28 @@ class Watcher:
         """The rows that belong to the run, and whether it ends: the last row is that of the event then."""
         assert self._last is not None
         joined = Record(*(np.concatenate(pair) for pair in zip(self._last, rows, strict=True)))
-        located = sorted(
-            (self._located(joined, crossing) for crossing in self._crossings(joined)),
-            key=lambda found: found[0]["time"],
-        )
+        located = self._in_order(self._located(joined, crossing) for crossing in self._crossings(joined))
         for found, event, row, at_event in located:
             self.found.append(found)
             if event.stop:
                 self.ended_by = event.name
+                apart = AT_ONCE * self._spacing
+                at_once = (other for other, *_ in located if abs(other["time"] - found["time"]) <= apart)
+                self.found += [other for other in at_once if other not in self.found]
                 before = [column[1:row] for column in joined]
                 return Record(*(np.concatenate(pair) for pair in zip(before, at_event, strict=True))), True
         self._memory = [seen(joined, memory)[1] for seen, memory in zip(self._seen, self._memory, strict=True)]
         self._last = Record(*(column[-1:].copy() for column in rows))
         return rows, False
+
+    def _in_order(self, located: Iterable[_Located]) -> list[_Located]:
+        """By their times; those of one moment as they are declared, which rounding would order by chance."""
+        found = sorted(located, key=lambda one: one[0]["time"])
+        moment, moments = -1, []
+        for k, one in enumerate(found):
+            moment += not k or one[0]["time"] - found[k - 1][0]["time"] > AT_ONCE * self._spacing
+            moments.append((moment, self.events.index(one[1]), k))
+        return [found[k] for *_, k in sorted(moments)]
 
     def _crossings(self, rows: Record) -> Iterator[_Crossing]:
         for number, event in enumerate(self.events):
@@ -148,8 +166,7 @@ class Watcher:
                     number, k + 1, bool(rises[k]), rate, self._seen[number](before, self._memory[number])[1]
                 )
 
-    def _located(self, rows: Record, crossing: _Crossing) -> tuple[dict[str, Any], Event, int, Record]:
-        """The event as plain data, its declaration, the row that follows it, and a row of its own."""
+    def _located(self, rows: Record, crossing: _Crossing) -> _Located:
         event, seen, k = self.events[crossing.number], self._seen[crossing.number], crossing.row - 1
         sign = 1.0 if crossing.rising else -1.0
 
@@ -192,7 +209,7 @@ class Watcher:
 
 def _seen(system: System, event: Event) -> _Seen:
     if not isinstance(event.quantity, str):
-        return _function(system, event.quantity)
+        return _function(system, event.name, event.quantity)
     known = catalogue(system)
     head, _, label = event.quantity.rpartition(".")
     if event.quantity in known and not known[event.quantity].axes:
@@ -200,8 +217,8 @@ def _seen(system: System, event: Event) -> _Seen:
     elif head in known and known[head].axes and label in known[head].axes[0].labels:
         name, at = head, known[head].axes[0].labels.index(label)
     else:
-        close = get_close_matches(event.quantity, [*known, *(f"{n}.{c}" for n in known for c in "xyz")], 3)
-        hint = f"did you mean {', '.join(close)}?" if close else f"there are: {', '.join(known)}"
+        close = get_close_matches(event.quantity, list(_numbers_of(known)), 3)
+        hint = f"did you mean {', '.join(close)}?" if close else f"numbers and components are of: {', '.join(known)}"
         raise InputError(f"event {event.name!r}: {event.quantity!r} is no number of the scene; {hint}")
     compute = known[name].compute
 
@@ -212,10 +229,27 @@ def _seen(system: System, event: Event) -> _Seen:
     return values
 
 
-def _function(system: System, function: Callable[[float, StateView], float]) -> _Seen:
+def _numbers_of(known: Mapping[str, Entry]) -> Iterator[str]:
+    """Names of all that is one number and has one axis at most."""
+    for name, entry in known.items():
+        if len(entry.axes) < 2:
+            yield from (f"{name}.{label}" for label in entry.axes[0].labels) if entry.axes else (name,)
+
+
+def _function(system: System, event: str, function: Callable[[float, StateView], float]) -> _Seen:
+    def value(t: float, x: Array, v: Array) -> float:
+        try:
+            found = float(function(t, StateView(system.scene, system.layout, x, v)))
+        except Exception as error:
+            raise InputError(
+                f"event {event!r}: its Python function at t = {t:.6g} s: {error or type(error).__name__}"
+            ) from error
+        if not np.isfinite(found):
+            raise InputError(f"event {event!r}: its Python function at t = {t:.6g} s is {found}; it must be finite")
+        return found
+
     def values(record: Record, memory: Any) -> tuple[Array, Any]:
-        rows = zip(record.time, record.x, record.v, strict=True)
-        return np.array([float(function(t, StateView(system.scene, system.layout, x, v))) for t, x, v in rows]), None
+        return np.array([value(t, x, v) for t, x, v in zip(record.time, record.x, record.v, strict=True)]), None
 
     return values
 

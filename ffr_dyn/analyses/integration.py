@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
+from numbers import Real
 from pathlib import Path
 from typing import Any, get_args
 
@@ -29,7 +30,7 @@ from ffr_dyn.consistency.following import LOST, STALLED, Lost, jumped, lost_driv
 from ffr_dyn.consistency.step_error import ENDED_BY
 from ffr_dyn.consistency.validity import meaningless
 from ffr_dyn.functions.stopwatch import Stopwatch
-from ffr_dyn.integrators import Integrator, methods
+from ffr_dyn.integrators import Integrator, Within, methods
 from ffr_dyn.integrators.stabilisation import Baumgarte, Projection, Stabilisation, excess_of_gains, gains
 from ffr_dyn.kernels.tables import (
     AT,
@@ -180,13 +181,13 @@ def _writer(path: str | Path, scene: Scene, run: _Run, header: dict[str, Any], m
 
 def check_output_step(output_step: float) -> None:
     """Raises InputError for one that is none."""
-    if not 0 < output_step < np.inf:
+    if not isinstance(output_step, Real) or not 0 < output_step < np.inf:
         raise InputError(f"the output step is {output_step} s; it must be positive and finite")
 
 
 def check_method(method: object) -> None:
-    """Raises InputError for a name or a class in place of a method with its settings."""
-    if isinstance(method, (str, type)):
+    """Raises InputError for what is no method with its settings, such as a name, a class or another program's solver."""
+    if isinstance(method, type) or not (isinstance(method, Within | None) or hasattr(method, "do_step")):
         raise InputError(f"method is {method!r}; give one with its step, such as ROS2(1e-3)")
 
 

@@ -112,6 +112,8 @@ def inverse(
     require_driven(undeformed(scene), start, "inverse dynamics")
     if isinstance(elastic, QuasiStatic):
         return _quasi_static(scene, (start, end, output_step), outputs, path, progress)
+    if not isinstance(elastic, Dynamic):
+        raise InputError(f"elastic is {elastic!r}; give Dynamic() or QuasiStatic()")
     result = forward(
         scene, end=end, output_step=output_step, method=elastic.method, start=start,
         stabilisation=elastic.stabilisation, begin=elastic.begin, outputs=needed(scene, outputs), path=path,

@@ -200,7 +200,7 @@ def linearise(
 
     inputs  : efforts, names of loads of the scene (an input of one doubles the load), or "base.x", "base.y", "base.z", an
               acceleration of the ground, to whose frame all outputs refer
-    outputs : names of components of a result, such as "rod.tip.position.y"
+    outputs : components of a result, such as "rod.tip.position.y", or quantities, "rod.tip.position": its components
     For an equilibrium: ``linearise(scene_at(scene, static(scene)))``.
 
     Raises InputError when nothing is free to move, or for a name that does not exist.
@@ -225,6 +225,7 @@ def linearised(
     steady = steady_about(near, inputs)
     near, rounding = graded(near, _without_inputs(near, inputs))
     A, error, solved = _solved(_without_inputs(near, inputs), steady, rounding)
+    outputs = _components(near, outputs)
     B, C, D = inputs_and_outputs(near, scene, inputs, outputs)
     parts = near.Z @ solved.parts
     modes = main_parts(parts)
@@ -248,7 +249,7 @@ def linearised(
     driven = tuple(driver.name for driver in scene.drivers)
     return Linearisation(
         A, B, C, D, near.Z, solved.values, modes, leading, solved.free, driven, seen / (2 * np.pi), whirl, names,
-        tuple(outputs), error, notes, near,
+        outputs, error, notes, near,
     )  # fmt: skip
 
 
@@ -446,7 +447,7 @@ def _output_matrices(
         x, v = state(chart, deviation[:d], deviation[d:])
         evaluate(chart.at, chart.time, x, v)
         result = result_of(chart.at.system, chart.at.record, {}, outputs=("default", *quantities))
-        values = np.array([_scalar(result, name) for name in outputs])
+        values = np.array([float(result[name][0]) for name in outputs])
         return values - 2 * np.pi * turns * np.round((values - here) / (2 * np.pi))
 
     turns, here = np.array([name.endswith(".angle") for name in outputs]), np.zeros(len(outputs))
@@ -467,13 +468,10 @@ def quantities_of(near: Chart, outputs: tuple[str, ...]) -> list[str]:
     return [name for name in found if name]
 
 
-def _scalar(result: Result, name: str) -> float:
-    values = result[name]
-    if values.ndim != 1:
-        raise InputError(
-            f"output {name!r} has several components; name one, such as {next(result.components([name]))!r}"
-        )
-    return float(values[0])
+def _components(near: Chart, outputs: tuple[str, ...]) -> tuple[str, ...]:
+    """Every component of the outputs."""
+    result = result_of(near.at.system, near.at.record, {}, outputs=("default", *quantities_of(near, outputs)))
+    return tuple(one for name in outputs for one in result.components([name]))
 
 
 # ---- as a result -----------------------------------------------------------------------------------------------------

@@ -145,6 +145,8 @@ def mixed(
     >>> result = fd.mixed(scene, unknown=(torque,), end=0.5, output_step=1e-3)
     """
     require_scene(scene)
+    if not isinstance(solution, Causal | Bounded | None):
+        raise InputError(f"solution is {solution!r}; give Causal() or Bounded(), or none")
     names, unknown = _known(scene, known), several("unknown", unknown, get_args(Effort))
     partners = _collocated(scene, names, unknown)
     if partners is not None and solution is None:

@@ -107,6 +107,8 @@ def reference(
 
     >>> exact = fd.reference(scene, end=0.5, output_step=0.01)
     """
+    if not isinstance(method, Reference):
+        raise InputError(f"method is {method!r}; give SciPy() or IDA() here, and methods of steps to `forward`")
     times = output_times(start, end, output_step)
     assembled = begun(assemble(scene, time=start), start, begin)
     at = evaluator(assembled.system)

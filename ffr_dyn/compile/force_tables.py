@@ -53,12 +53,14 @@ class FunctionTable:
         self.slots = 0
         self.signals: dict[str, tuple[float, list[int]]] = {}
 
-    def add(self, function: TimeFunction, what: str = "function") -> int:
+    def add(self, function: TimeFunction, what: str = "function", *, derivatives: int = 0) -> int:
+        """The number of a function, of which a Python function must tell so many derivatives."""
         if function.callback is not None:
-            slot = self.callback(function.callback, (1, 2, 3), what, with_state=False)
+            sizes = tuple(range(1 + derivatives, 4))
+            slot = self.callback(function.callback, sizes, what, with_state=False)
             function = TimeFunction(USER, (float(slot), *function.data[1:]))
         elif function.kind == OPERATION:
-            rows = [float(self.add(operand, what)) for operand in function.operands]
+            rows = [float(self.add(operand, what, derivatives=derivatives)) for operand in function.operands]
             function = TimeFunction(OPERATION, (*function.data, rows[0], rows[-1]))
         self.functions.append(function)
         self.purposes.append(what)
@@ -123,8 +125,8 @@ class LoadNumbers:
         self.data += np.ravel(numbers).tolist()
         return start
 
-    def function(self, value: Any) -> int:
-        return self._functions.add(as_time_function(value, self.who), self.who)
+    def function(self, value: Any, *, derivatives: int = 0) -> int:
+        return self._functions.add(as_time_function(value, self.who), self.who, derivatives=derivatives)
 
     def callback(self, function: Callable[..., Any] | None, *sizes: int) -> int:
         return -1 if function is None else self._functions.callback(function, sizes, self.who, with_state=True)

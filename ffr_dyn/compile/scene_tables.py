@@ -244,10 +244,18 @@ def _checked(callback: Callback, returned: object) -> Array:
     """The numbers that a Python function has returned."""
     given = np.atleast_1d(np.asarray(returned, dtype=float))
     if given.ndim != 1 or given.size not in callback.sizes:
-        raise InputError(f"the function returned {given!r}, not numbers of the right count")
+        raise InputError(f"the function returned {given!r}, not {_wanted(callback)}")
     if not np.isfinite(given).all():
         raise InputError(f"the function returned {given}; it must be finite")
     return given
+
+
+def _wanted(callback: Callback) -> str:
+    """What it must return, in words."""
+    if callback.with_state or min(callback.sizes) == 1:
+        return f"numbers of the right count, {' or '.join(str(size) for size in callback.sizes)}"
+    parts = ("(value, rate, second derivative)", "(value, rate)")[3 - min(callback.sizes)]
+    return f"{parts}, which are needed here; give all, or a formula, fd.table or fd.recorded, which know theirs"
 
 
 def _at(address: int, size: int) -> Array:

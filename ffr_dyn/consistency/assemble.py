@@ -17,6 +17,7 @@ from ffr_dyn.closing.going_on import going_on
 from ffr_dyn.closing.independence import independent_blocks
 from ffr_dyn.closing.inertia_left import require_inertia, with_traces
 from ffr_dyn.closing.positions import close_positions, close_velocities
+from ffr_dyn.compile.memory import check_memory
 from ffr_dyn.compile.scene_tables import System, compile_scene
 from ffr_dyn.consistency.across import rows_across
 from ffr_dyn.consistency.dropped_terms import check_dropped
@@ -28,7 +29,7 @@ from ffr_dyn.equations.layout import Layout, initial_state
 from ffr_dyn.functions.overshoots import overshoots
 from ffr_dyn.scene.followed import TURN
 from ffr_dyn.scene.force_kinds import forces_of
-from ffr_dyn.scene.scene import Scene, altered, measured_body, require_scene
+from ffr_dyn.scene.scene import Scene, altered, length_of, measured_body, require_scene
 from ffr_dyn.scene.sensors import Measurement
 from ffr_dyn.variants.aligned import levelled
 from ffr_dyn.variants.mean_axis import in_mean_axis_frames
@@ -117,6 +118,7 @@ def assemble(scene: Scene, *, time: float = 0.0) -> Assembled:
     free = _movable(place) - count
     system = compile_scene(scene, kept) if redundant else rows.engine.system
     notes += _beyond_tables(system)
+    check_memory(system.user, time, x, v)
     return Assembled(system, all_rows, x, v, free, tuple(notes), tuple(redundant), flat.computed)
 
 

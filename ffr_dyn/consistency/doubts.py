@@ -9,16 +9,19 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
-from ffr_dyn.compile.scene_tables import System
+from ffr_dyn.compile.memory import check_repeats
+from ffr_dyn.compile.scene_tables import System, of_time
 from ffr_dyn.consistency.assemble import Assembled
 from ffr_dyn.consistency.evaluation import evaluate, evaluator
 from ffr_dyn.consistency.explicit_forces import candidates, fastest, told
 from ffr_dyn.consistency.following import jump_of, row_named, torn_open, unfollowed
 from ffr_dyn.consistency.validity import extremes, meaningless, strained, unstiffened
 from ffr_dyn.equations.inertia import kept_integrals, mass_matrix
+from ffr_dyn.functions.told_rates import wrong_rate
 from ffr_dyn.integrators import Integrator
 from ffr_dyn.integrators.stabilisation import Projection, Stabilisation
 from ffr_dyn.kernels.tables import MOMENT, OPENED, PHI, Record, Work
@@ -85,7 +88,8 @@ class Seen:
     tolerance : that constraints are to be met with [m, -];  apart : from where a mechanism has come apart
     arrays    : "bodies" (4, B) as `ffr_dyn.consistency.validity.extremes`; "open" (3,) the largest constraint left open, its
                 time, its number; "driven" (2, D) of each driver the largest difference from what it prescribes, and its
-                largest second derivative; "rates" (F,) [1/s] of the forces that the method takes explicitly; "wound" (F,)
+                largest second derivative; "told" (4, C) a derivative that a Python function of time tells and has not, of
+                order 0 where there is none; "rates" (F,) [1/s] of the forces that the method takes explicitly; "wound" (F,)
                 [rad] how far the axes of forces in six directions are turned against each other; "x" (X,) of the last row
     """
 
@@ -106,6 +110,7 @@ def nothing_seen(
     """Before the first row."""
     scene = assembled.system.scene
     sizes = {"bodies": (4, len(scene.bodies)), "open": (3,), "driven": (2, len(scene.drivers))}
+    sizes |= {"told": (4, len(assembled.system.user.callbacks))}
     sizes |= {"rates": (len(forces_of(scene)),), "wound": (len(forces_of(scene)),), "x": (assembled.x.size,)}
     return Seen(assembled, method, tolerance, apart, {name: np.zeros(size) for name, size in sizes.items()})
 
@@ -123,8 +128,12 @@ def _size(scene: Scene) -> float:
 
 
 def look(seen: Seen, view: View) -> None:
-    """Take note of the rows that follow, whose violations are those of all rows, redundant ones included."""
+    """Take note of the rows that follow, whose violations are those of all rows, redundant ones included.
+
+    Raises InputError for Python functions that remember.
+    """
     system, rows, arrays = seen.assembled.system, view.record, seen.arrays
+    check_repeats(system.user, rows.time, rows.x, rows.v)
     arrays["bodies"][:] = np.maximum(arrays["bodies"], extremes(system, rows))
     arrays["x"][:] = rows.x[-1]
     worst = int(np.argmax(rows.violation[:, 0]))
@@ -132,6 +141,11 @@ def look(seen: Seen, view: View) -> None:
         arrays["open"][:] = _opened(seen.assembled, rows, worst)
     if seen.scene.drivers:
         arrays["driven"][:] = np.maximum(arrays["driven"], np.array([_driven(view, d) for d in seen.scene.drivers]).T)
+    for number, callback in enumerate(system.user.callbacks):
+        if not callback.with_state and (
+            wrong := wrong_rate(partial(of_time, callback), rows.time, min(callback.sizes) - 1)
+        ):
+            arrays["told"][:, number] = wrong
     arrays["wound"][:] = np.maximum(arrays["wound"], [_wound(view, k, force) for k, force in _forces(seen)])
     if seen.method is not None and (explicit := candidates(system, seen.method)):
         arrays["rates"][:] = np.maximum(arrays["rates"], fastest(evaluator(system), rows, explicit))
@@ -225,7 +239,12 @@ def _found(seen: Seen) -> dict[str, list[str]]:
     return {
         **_constraints(seen, quick),
         ASTRAY: [
-            _astray(d, off) for d, off in zip(scene.drivers, seen.arrays["driven"][0], strict=True) if off > BESIDE
+            *(
+                _misled(callback.what, *wrong)
+                for callback, wrong in zip(seen.assembled.system.user.callbacks, seen.arrays["told"].T, strict=True)
+                if wrong[-1]
+            ),
+            *(_astray(d, off) for d, off in zip(scene.drivers, seen.arrays["driven"][0], strict=True) if off > BESIDE),
         ],
         QUICK: quick,
         STIFF: [] if seen.method is None else told(seen.assembled.system, seen.method, seen.arrays["rates"]),
@@ -249,6 +268,14 @@ def _constraints(seen: Seen, quick: list[str]) -> dict[str, list[str]]:
         what = "the driver is not followed" if block.driver else "the mechanism has come apart"
         return {APART: [f"{where}: {what}; {quick[0] if quick else change}"]}
     return {OPEN: [f"{where}, the most of all, and more than {seen.tolerance:.1g}; {change}"]}
+
+
+def _misled(what: str, time: float, told: float, found: float, order: float) -> str:
+    name, of = ("rate", "value") if order == 1 else ("second derivative", "rate")
+    return (
+        f"{what}: its Python function tells a {name} of {told:.4g} at t = {time:.6g} s, where its {of} changes by "
+        f"{found:.4g} in a second: correct it, or take a formula or fd.table, which know theirs"
+    )
 
 
 def _astray(driver: Driver | PointDriver, off: float) -> str:

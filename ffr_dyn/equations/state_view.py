@@ -11,6 +11,7 @@ from ffr_dyn.equations.layout import Layout
 from ffr_dyn.functions.rotation import from_matrix, product, rotation_matrix
 from ffr_dyn.scene.scene import Scene
 from ffr_prep.common.arrays import Array
+from ffr_prep.common.errors import InputError
 
 
 @dataclass(frozen=True)
@@ -79,4 +80,7 @@ class StateView:
         return turning(body_state(self.layout, self.x, self.v, b), frame.marker.phi_r, frame.marker.K[3:])
 
     def _number(self, name: str) -> int:
-        return [body.name for body in self.scene.bodies].index(name)
+        names = [body.name for body in self.scene.bodies]
+        if name not in names:
+            raise InputError(f"there is no body {name!r}; there are: {', '.join(names)}")
+        return names.index(name)

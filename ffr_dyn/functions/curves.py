@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ffr_dyn.functions.time_functions import numbers_in
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.brief import Brief
 from ffr_prep.common.errors import InputError
@@ -30,7 +31,7 @@ class Curve(Brief):
     values: Any
 
     def __post_init__(self) -> None:
-        at, values = np.array(self.at, float), np.array(self.values, float)
+        at, values = numbers_in("places of a curve", self.at), numbers_in("values of a curve", self.values)
         if at.ndim != 1 or at.shape != values.shape or at.size < 2:
             raise InputError(f"a curve needs two or more places and as many values, not {at.size} and {values.size}")
         if not (np.isfinite(at).all() and np.isfinite(values).all()):

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from functools import wraps
 from inspect import signature
 from numbers import Real
+from reprlib import repr as brief
 from typing import ParamSpec
 
 import numpy as np
@@ -107,7 +108,7 @@ def table(times: Array, values: Array) -> TimeFunction:
     """
     from scipy.interpolate import CubicSpline
 
-    t, y = np.asarray(times, float), np.asarray(values, float)
+    t, y = numbers_in("times of a table", times), numbers_in("values of a table", values)
     if t.ndim != 1 or t.shape != y.shape or t.size < 2 or not (np.diff(t) > 0).all():
         raise InputError("a table needs two or more increasing times and as many values")
     _numbers("table", (*t, *y))
@@ -128,7 +129,8 @@ def piecewise(breaks: Array, coefficients: Array) -> TimeFunction:
 
     >>> ramp = fd.piecewise(np.array([0.0, 1.0, 2.0]), np.array([[0.0, 1.0], [1.0, 0.0]]))
     """
-    shape, steps = np.shape(coefficients), np.diff(np.asarray(breaks, float))
+    given, breaks = numbers_in("coefficients", coefficients), numbers_in("breaks", breaks)
+    shape, steps = given.shape, np.diff(breaks)
     if len(shape) != 2 or steps.shape != shape[:1] or not (steps > 0).all():
         raise InputError(
             f"a piecewise polynomial needs coefficients (pieces, k) and increasing breaks (pieces + 1,); here are {shape} "
@@ -136,7 +138,7 @@ def piecewise(breaks: Array, coefficients: Array) -> TimeFunction:
         )
     return TimeFunction(
         PIECEWISE,
-        (float(shape[0]), float(shape[1]), *_numbers("piecewise polynomial", (*breaks, *np.ravel(coefficients)))),
+        (float(shape[0]), float(shape[1]), *_numbers("piecewise polynomial", (*breaks, *given.ravel()))),
     )
 
 
@@ -212,6 +214,14 @@ def as_time_function(value: object, what: str) -> TimeFunction:
 def is_zero(function: TimeFunction) -> bool:
     """Whether a function is the constant zero by its declaration."""
     return function.kind == POLYNOMIAL and function.callback is None and not any(function.data)
+
+
+def numbers_in(what: str, given: object) -> Array:
+    """An array of the numbers; InputError where there are others than numbers in it, or rows of different lengths."""
+    try:
+        return np.array(given, float)
+    except (TypeError, ValueError):
+        raise InputError(f"{what}: give numbers, as many in each row, not {brief(given)}") from None
 
 
 def _numbers(what: str, values: tuple[float, ...]) -> tuple[float, ...]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -25,6 +25,8 @@ def speed_list(texts: Sequence[Any]) -> tuple[float, ...]:
 
     Raises InputError for any other text, with the forms that there are.
     """
+    if not isinstance(texts, Iterable) or isinstance(texts, str):
+        raise InputError(f"speeds are {texts!r}; give them in a list, such as [100, 200] or ['0..500']")
     found = [speed for text in texts for speed in _speeds(text)]
     if not np.isfinite(found).all():
         raise InputError(f"speeds {list(texts)}: a speed must be finite")

@@ -25,6 +25,7 @@ from typing import Any
 import numpy as np
 
 from ffr_dyn.analyses.checkpoint import fingerprint, leaves
+from ffr_dyn.analyses.integration import check_method
 from ffr_dyn.compile.divided_steps import too_fast
 from ffr_dyn.compile.engine import new_engine, row_filler
 from ffr_dyn.compile.scene_tables import System
@@ -32,7 +33,7 @@ from ffr_dyn.compile.workspace import new_record
 from ffr_dyn.consistency.assemble import Assembled, assemble
 from ffr_dyn.consistency.doubts import between_rows, ended, held, look, nothing_seen
 from ffr_dyn.consistency.failure import Settings, failure
-from ffr_dyn.integrators import Integrator
+from ffr_dyn.integrators import Integrator, Within
 from ffr_dyn.integrators.stabilisation import Projection, Stabilisation, gains
 from ffr_dyn.kernels.tables import MEASURED, NEXT, OK, PER_ROW
 from ffr_dyn.results.quantities import DEFAULT_OUTPUTS, Entry, catalogue, needs_every_step, selected
@@ -80,9 +81,8 @@ class Stepper(Brief):
         start: float = 0.0,
         stabilisation: Stabilisation = Projection(),  # noqa: B008 - frozen
     ) -> None:
-        if isinstance(method, (str, type)):
-            raise InputError(f"method is {method!r}; give one with its step, such as ROS2(1e-3)")
-        if method.controlled:
+        check_method(method)
+        if isinstance(method, Within | None) or method.controlled:
             raise InputError(
                 f"{type(method).__name__} chooses its steps: their cost has no bound; use ROS2, ROS3 or RK4"
             )

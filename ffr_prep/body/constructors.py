@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import lru_cache
+from numbers import Real
 
 import numpy as np
 
@@ -34,25 +35,34 @@ def rigid_body(
 
     >>> crank = fd.rigid_body("crank", mass=1.2, inertia=[1e-3, 1e-3, 2e-3], points={"pin": (0.05, 0, 0)})
     """
-    if not 0 < mass < np.inf:
+    if not isinstance(mass, Real) or not 0 < mass < np.inf:
         raise BodyError(f"body {name!r}: mass is {mass} kg; it must be positive")
-    tensor = np.asarray(inertia, float)
+    if not isinstance(points, Mapping | None):
+        raise BodyError(f"body {name!r}: points is {points!r}; give them by name, such as {{'pin': (0, 0, 0)}}")
+    tensor = _numbers(name, "inertia", inertia)
     tensor = np.diag(tensor) if tensor.ndim == 1 else tensor
     if tensor.shape != (3, 3):
         raise BodyError(f"body {name!r}: inertia must be (3,) or (3, 3), not {np.shape(inertia)}")
-    c = np.asarray(centre_of_mass, float)
+    c = _numbers(name, "centre_of_mass", centre_of_mass)
     if c.shape != (3,):
         raise BodyError(f"body {name!r}: centre_of_mass must be (3,), not {c.shape}")
     if not np.abs([mass, *tensor.ravel(), *c.ravel()]).max() < _MOST:
         raise BodyError(
             f"body {name!r}: mass {mass:g} kg, inertia and centre of mass must be finite; give them in SI units"
         )
-    places = {key: np.asarray(at, float) for key, at in (points or {}).items()}
+    places = {key: _numbers(name, f"point {key!r}", at) for key, at in (points or {}).items()}
     for key, at in places.items():
         check_point(f"body {name!r}: point", key, at)
     numbers = tuple((key, at.shape, at.tobytes()) for key, at in places.items())
     made = _rigid(name, float(mass), tensor.tobytes(), c.tobytes(), numbers)
     return made if surface is None else replace(made, surface=surface)
+
+
+def _numbers(name: str, what: str, given: ArrayLike) -> Array:
+    try:
+        return np.asarray(given, float)
+    except (TypeError, ValueError):
+        raise BodyError(f"body {name!r}: {what} is {given!r}; give numbers") from None
 
 
 @lru_cache(256)

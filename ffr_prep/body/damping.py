@@ -43,6 +43,8 @@ class Damping:
         for name in ("alpha", "beta", "loss_factor"):
             if not 0 <= (value := getattr(self, name)) < np.inf:
                 raise BodyError(f"{name} is {value!r}; damping is a number from zero")
+        if np.ndim(self.ratios) != 1:
+            raise BodyError(f"damping ratios are {self.ratios!r}; give them in a list, such as [0.01]")
         if not all(0 <= ratio < np.inf for ratio in self.ratios):
             raise BodyError(f"damping ratios are {list(self.ratios)}; give numbers from zero")
         if len(self.bands):

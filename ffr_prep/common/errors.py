@@ -1,5 +1,9 @@
 """The two ways in which a call can fail. The command line turns them into exit codes 2 and 1."""
 
+from __future__ import annotations
+
+from typing import Any
+
 
 class InputError(ValueError):
     """Input that cannot be used. The message names the thing, its value and the remedy.
@@ -15,3 +19,9 @@ class ComputationError(RuntimeError):
     >>> try: result = fd.static(scene)
     ... except fd.ComputationError as error: print(error)
     """
+
+
+def require_kind(given: object, kind: Any, what: str, such: str) -> None:
+    """Raises InputError unless it is of a type, or one of a union."""
+    if not isinstance(given, kind):
+        raise InputError(f"{what} is of the type {type(given).__name__}; give {such}")

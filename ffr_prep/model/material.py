@@ -20,7 +20,7 @@ import numpy as np
 
 from ffr_prep.body import TENSOR
 from ffr_prep.common.arrays import Array
-from ffr_prep.common.errors import InputError
+from ffr_prep.common.errors import InputError, require_kind
 from ffr_prep.common.reading import read_toml
 from ffr_prep.common.units import si_number
 
@@ -114,7 +114,8 @@ Solid = Material | AnisotropicMaterial
 
 
 def check_isotropic(material: Solid, owner: str) -> None:
-    """InputError where beams and plates are given an anisotropic material."""
+    """InputError where beams and plates are given an anisotropic material, or none."""
+    require_kind(material, Material | AnisotropicMaterial, f"{owner}: material", "one such as material('steel')")
     if not isinstance(material, Material):
         raise InputError(
             f"{owner}: material {material.name!r} is not isotropic, as beams and plates must be: mesh the part as a solid"

@@ -5,14 +5,14 @@ Rows are coordinates of nodes, however many a node has. Those that follow a rigi
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 import scipy.sparse as sp
 
 from ffr_prep.body.constructors import require_name
 from ffr_prep.common.arrays import Array
-from ffr_prep.common.errors import InputError
+from ffr_prep.common.errors import InputError, require_kind
 from ffr_prep.model.coupled import InterfaceRegion
 
 
@@ -57,6 +57,7 @@ def six_rows(motion: Array, columns: Array, size: int) -> sp.csr_array:
 
 def check_names(interfaces: Sequence[InterfaceRegion]) -> None:
     """Raises InputError for texts in the place of interfaces, for names that no quantity could carry, and repeated ones."""
+    require_kind(interfaces, Iterable, "interfaces", "a list of InterfaceRegion(name)")
     texts = [interface for interface in interfaces if isinstance(interface, str)]
     if texts:
         raise InputError(f"interface {texts[0]!r} is a text; write InterfaceRegion({texts[0]!r})")

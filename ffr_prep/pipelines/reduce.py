@@ -23,7 +23,7 @@ from ffr_prep.body import (
 )
 from ffr_prep.body.provenance import described
 from ffr_prep.common.arrays import Array
-from ffr_prep.common.errors import ComputationError, InputError
+from ffr_prep.common.errors import ComputationError, InputError, require_kind
 from ffr_prep.common.progress import Advance, Stages, no_advance, no_stages
 from ffr_prep.model.coupled import CoupledModel
 from ffr_prep.model.cuts import Cuts
@@ -93,7 +93,7 @@ class Request:
             ("reference", self.reference, 'FixedTo("root")'),
             ("reduction", self.reduction, "CraigBampton(10), or Union((CraigBampton(10), InertiaRelief()))"),
         ):
-            if isinstance(given, (str, type, tuple, list)):
+            if isinstance(given, type) or not hasattr(given, "rows" if what == "reference" else "basis"):
                 raise InputError(f"{what} is {given!r}; give one such as {such}")
 
 
@@ -110,6 +110,7 @@ def reduce(
 
     >>> body = fp.reduce(model, fp.Request(name="rod", reference=fp.FixedTo("hinge"), reduction=fp.CraigBampton(8)))
     """
+    require_kind(model, Model, "model", "that of from_mesh, from_frame, from_matrices or tied")
     if model.massless and request.quality:
         raise InputError(
             "the quality of a reduction needs a mass for every coordinate, and some have none: leave out the quality report"

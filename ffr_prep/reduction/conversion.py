@@ -58,6 +58,8 @@ def with_reference(body: FlexibleBody, conditions: ReferenceConditions) -> Flexi
     """
     if isinstance(conditions, UserConditions):
         raise InputError("conditions on the nodes of the mesh need the mesh: reduce it again, or use interfaces")
+    if not hasattr(conditions, "rows"):
+        raise InputError(f"the other reference is {conditions!r}; give one such as FixedTo('root') or MeanAxis()")
     model = motion_model(body)
     conditions = at_interfaces(conditions, model.names, model.positions)
     L = functionals(conditions, model)

@@ -10,7 +10,7 @@ import numpy as np
 
 from ffr_prep.body.provenance import described
 from ffr_prep.common.arrays import Array
-from ffr_prep.common.errors import InputError
+from ffr_prep.common.errors import InputError, require_kind
 from ffr_prep.common.progress import Stages, no_stages
 from ffr_prep.mesh.geometry.skin import region_faces, with_regions
 from ffr_prep.mesh.mesh import Mesh, check_mesh, mesh_hash, misfit_doubts
@@ -46,6 +46,8 @@ def from_mesh(
 
     >>> model = fp.from_mesh(fp.read_mesh("rod.geo"), fp.material("steel"), [fp.InterfaceRegion("big_eye")])
     """
+    require_kind(mesh, Mesh, "mesh", "that of read_mesh; beams and plates belong to from_frame")
+    check_names(interfaces)
     progress("check the mesh")
     check_mesh(mesh)
     plain, mesh = mesh, with_interfaces(mesh, interfaces)

@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 from ffr_prep.body import content_hash
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.brief import Brief, Rows, listed
-from ffr_prep.common.errors import InputError
+from ffr_prep.common.errors import InputError, require_kind
 from ffr_prep.common.in_words import extent_in_words
 from ffr_prep.common.reading import check_count
 from ffr_prep.mesh.geometry.node_regions import nodes_of_region
@@ -52,6 +52,7 @@ class Member:
     orientation: Vector | None = None
 
     def __post_init__(self) -> None:
+        require_kind(self.section, Section, "the section of a member", "one such as tube(0.04, 0.002)")
         check_isotropic(self.material, f"member of {self.section.name!r}")
         given = self.orientation
         if given is not None and (np.shape(given) != (3,) or not 0 < np.linalg.norm(given) < np.inf):
@@ -159,6 +160,7 @@ def polyline(corners: Sequence[Vector] | Array, member: Member, *, elements: int
 
     >>> frame = fp.polyline([(0, 0, 0), (1, 0, 0)], fp.Member(fp.circle(0.02), fp.material("steel")), elements=10)
     """
+    require_kind(member, Member, "the member of a polyline", "Member(section, material)")
     at = np.asarray(corners, float)
     if at.ndim != 2 or at.shape[1] != 3 or len(at) < 2:
         raise InputError(f"a polyline needs two or more corners (x, y, z); it has the shape {at.shape}")
@@ -183,6 +185,10 @@ def panel(corners: Sequence[Vector] | Array, shell: Shell, *, elements: tuple[in
 
     >>> plate = fp.panel([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)], fp.Shell(2e-3, fp.material("steel")), elements=(8, 8))
     """
+    require_kind(shell, Shell, "the shell of a panel", "Shell(thickness, material)")
+    require_kind(
+        elements, Sequence | np.ndarray, "elements of a panel", "two numbers, along the first side and the second"
+    )
     at = np.asarray(corners, float)
     if at.shape != (4, 3) or not np.isfinite(at).all():
         raise InputError(f"a panel needs four finite corners (x, y, z); it has {at.tolist()}")

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ffr_prep.common.arrays import Array
-from ffr_prep.common.errors import InputError
+from ffr_prep.common.errors import InputError, require_kind
 from ffr_prep.common.progress import Stages, no_stages
 from ffr_prep.common.registry import choice
 from ffr_prep.mesh.geometry.face import METRES
@@ -45,6 +45,11 @@ def read_frame(
     >>> frame = fp.read_frame("tower.geo", {"legs": fp.Member(fp.tube(0.1, 0.005), fp.material("steel"))})
     """
     path, numbers = Path(path), dict(numbers or {})
+    for given, kind in ((members, Member), (shells, Shell)):
+        what = f"{kind.__name__.lower()}s"
+        require_kind(given, Mapping | None, what, f"each group its {kind.__name__}, as in {what}={{'legs': ...}}")
+        for name, one in (given or {}).items():
+            require_kind(one, kind, f"{what}: {name!r}", f"a {kind.__name__}")
     members, shells = dict(members or {}), dict(shells or {})
     check_request(path, unit, size, numbers, None)
     if path.suffix.lower() not in SUFFIXES:

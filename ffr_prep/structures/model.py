@@ -22,6 +22,7 @@ from ffr_prep.body import WITHOUT_SHEAR, Surface
 from ffr_prep.body.accelerations import INERTIAL, unit_accelerations
 from ffr_prep.body.provenance import described
 from ffr_prep.common.arrays import Array
+from ffr_prep.common.errors import require_kind
 from ffr_prep.common.process_memory import check_memory
 from ffr_prep.common.progress import Stages, no_stages
 from ffr_prep.model.coupled import CoupledModel, InterfaceRegion
@@ -30,6 +31,7 @@ from ffr_prep.model.material import material_doubts
 from ffr_prep.model.model import Model, merged, summed
 from ffr_prep.model.region_rotations import region_stiffening
 from ffr_prep.model.second_order import SecondOrder
+from ffr_prep.model.ties import check_names
 from ffr_prep.solvers.threads import on_one_thread
 from ffr_prep.structures.cutting import cut_frame
 from ffr_prep.structures.element_families import Family, connectivity, element_values, families
@@ -66,6 +68,8 @@ def from_frame(frame: Frame, interfaces: Sequence[InterfaceRegion] = (), *, prog
 
     >>> model = fp.from_frame(frame, [fp.InterfaceRegion("root"), fp.InterfaceRegion("tip")])
     """
+    require_kind(frame, Frame, "frame", "one of polyline, panel or read_frame; a mesh belongs to from_mesh")
+    check_names(interfaces)
     _check_size(frame)
     progress("check the frame")
     check_frame(frame)

@@ -118,7 +118,7 @@ def campbell(
     >>> result = fd.campbell(scene, speeds=np.linspace(0, 500, 26), turn="motor")
     """
     require_scene(scene)
-    values = [float(speed) for speed in speeds]
+    values = list(speed_list(speeds))
     if len(values) < 2 or not (np.diff(values) > 0).all():
         raise InputError(f"the speeds are {values}; give two or more that rise, such as 0..500")
     at = _at_speeds(scene, turn, time)

@@ -38,8 +38,8 @@ class LoadTable(Protocol):
 
     @property
     def scene(self) -> Scene: ...
-    def function(self, value: Any) -> int:
-        """A number or function of time: the number of the function."""
+    def function(self, value: Any, *, derivatives: int = 0) -> int:
+        """A number or function of time: the number of the function. A Python function must tell so many derivatives."""
 
     def callback(self, function: Callable[..., Any] | None, *sizes: int) -> int:
         """A Python function of (t, state) that returns as many numbers: its first among the user's values; -1 for None."""

@@ -29,7 +29,7 @@ class Load(Force):
     marker : "body.interface"
     force, moment : three components each; a component is a number, a `TimeFunction` (constant, harmonic, table, ...)
         or a Python function of time
-    function : instead of these, a Python function (t, state) -> (3,) force or (6,) force and moment; `state` is a
+    function : added to these, a Python function (t, state) -> (3,) force or (6,) force and moment; `state` is a
         `ffr_dyn.equations.state_view.StateView`
     axes : "global", or "body" for a follower load
 

@@ -21,7 +21,7 @@ from ffr_prep.common.errors import InputError
 class Servo(Force):
     """Position control of a joint coordinate c: kp (target - c) + kd (target_dot - dc/dt), held within +-limit.
 
-    target : a number, a time function, or a Python function t -> value or (value, rate, second derivative)
+    target : a number, a time function, or a Python function t -> (value, rate); without kd, t -> value will do
     kp, kd : gains of position [N/m] and rate [N s/m], not negative
     limit  : largest force [N]; default: none;  turns : whole turns at the start
     joint : name of the joint
@@ -80,4 +80,4 @@ class Servo(Force):
         return share * self.kp, share * self.kd
 
     def compiled(self, table: LoadTable) -> LawNumbers:
-        return LawNumbers([self.kp, self.kd, self.limit], table.function(self.target))
+        return LawNumbers([self.kp, self.kd, self.limit], table.function(self.target, derivatives=1 if self.kd else 0))

@@ -333,3 +333,38 @@ def test_moments_between_steps_of_any_length_are_not_told_too_well_by_chance(val
     assert len(told) == 3
     assert (off < 5.0 * np.array(told)).all(), (off, told)
     assert (off < 1e-5).all()
+
+
+def test_events_of_one_moment():
+    """Of one that ends the run its others are told, too, whatever rounding puts first, as are their errors."""
+    angle, height, sine = (
+        Event("angle", "hinge.angle", 0.5, stop=True),
+        Event("height", lambda t, state: state.position("bar.e")[1], 0.6 * np.sin(0.5), stop=True),
+        Event("beside", "bar.e.position.x", 0.6 * np.cos(0.5)),
+    )
+    bar = rigid_body("bar", mass=2.0, inertia=(0.1, 0.1, 0.2), points={"o": (0, 0, 0), "e": (0.6, 0, 0)})
+    scene = Scene(
+        (Body("bar", bar, omega_bar=(0, 0, 2)),), (Joint("hinge", "revolute", "ground.O", "bar.o"),),
+        ground={"O": (0, 0, 0)}, gravity=(1, 2, 0),
+    )  # fmt: skip
+    for events in ((angle, height, sine), (sine, height, angle)):
+        result = forward(scene, end=1.0, output_step=0.05, method=ROS3(5e-3), events=events)
+        found = result.attributes["events"]
+        assert {event["event"] for event in found} == {"angle", "height", "beside"}
+        assert result.attributes["ended_by"] == next(event.name for event in events if event.stop)
+        assert np.ptp([event["time"] for event in found]) < 1e-8
+        assert not [note for note in result.attributes["notes"] if "doubt" in note or "may happen" in note]
+        assert all(event["error"] is not None for event in found)
+
+
+@pytest.mark.parametrize(
+    ("quantity", "better"),
+    [
+        ("hinge.angle.x", r"did you mean axle"),
+        ("axle.angle.x", r"mean axle\.angle,"),
+        ("ball.R", r"mean ball\.R\.[xyz]"),
+    ],
+)
+def test_what_is_no_number_is_answered_by_what_is(quantity, better):
+    with pytest.raises(InputError, match=better):
+        integrate(SPUN, end=0.1, output_step=0.05, method=RK4(0.01), events=(Event("e", quantity),))

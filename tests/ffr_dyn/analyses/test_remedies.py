@@ -107,6 +107,7 @@ PARTS = {
     "results/file.py": ("_damaged",),
     "analyses/energy.py": ("_told", "_cause"),
     "analyses/inversion/internal_dynamics.py": ("_unfit",),
+    "consistency/doubts.py": ("_misled",),
     "consistency/explicit_forces.py": ("told",),
     "consistency/failure.py": ("_locks", "_overflow", "_unconverged"),
     "consistency/validity.py": ("meaningless",),
@@ -563,7 +564,10 @@ INPUT = [
         lambda: linearise(felt(lambda t, s: (0, 0, 0)), inputs=("gust",)),
         p(linearise, HINGED, inputs=(fd.JointEffort("motor", "hinge"),)),
     ),
-    Case(p(linearise, HINGED, outputs=("bar.b.position",)), p(linearise, HINGED, outputs=("bar.b.position.x",))),
+    Case(
+        lambda: kinematic(replace(HINGED, drivers=(Driver("d", "hinge", lambda t: 2 * t),)), **HALF),
+        lambda: kinematic(replace(HINGED, drivers=(Driver("d", "hinge", lambda t: (2 * t, 2, 0)),)), **HALF),
+    ),
     Case(
         lambda: linearise(replace(HINGED, forces=(JointSpring("s", "hinge", 1.0),)), outputs=("s.work",)),
         p(linearise, replace(HINGED, forces=(JointSpring("s", "hinge", 1.0),)), outputs=("s.power",)),
@@ -755,7 +759,9 @@ INPUT = [
             replace(HINGED, drivers=(Driver("d", "hinge", lambda t: (np.sqrt(-1.0) if t < 0 else 1 / t, 0, 0)),)),
             time=0.0,
         ),
-        lambda: assemble(replace(HINGED, drivers=(Driver("d", "hinge", lambda t: (1 / t, 0, 0)),)), time=1.0),
+        lambda: assemble(
+            replace(HINGED, drivers=(Driver("d", "hinge", lambda t: (1 / t, -1 / t**2, 2 / t**3)),)), time=1.0
+        ),
     ),
     Case(
         lambda: Result(np.zeros(1), {"a": Quantity(np.zeros((1, 2)), "m", (Axis("a", ("x", "y")),))}),
@@ -972,6 +978,44 @@ INPUT = [
     Case(lambda: written(fd.show, HINGED, "a.gif"), lambda: written(fd.show, HINGED, "a.html")),
     Case(window, lambda: written(fd.show, HINGED, "a.html")),
     Case(lambda: tabled(None), lambda: tabled(PANDAS)),
+    Case(
+        lambda: kinematic(replace(HINGED, drivers=(Driver("d", "hinge", lambda t: (2 * t, 1, 0)),)), **HALF),
+        lambda: kinematic(replace(HINGED, drivers=(Driver("d", "hinge", lambda t: (2 * t, 2, 0)),)), **HALF),
+    ),
+    Case(
+        lambda: by_solver(HINGED, method=ROS2(1e-3), **HALF),  # type: ignore[arg-type]
+        p(by_solver, HINGED, method=SciPy(), **HALF),
+    ),
+    Case(p(fd.inverse, DRIVEN, elastic="dynamic", **HALF), p(fd.inverse, DRIVEN, elastic=fd.Dynamic(), **HALF)),
+    Case(
+        p(fd.mixed, DRIVEN, unknown=(fd.JointEffort("f", "hinge"),), solution="causal", **HALF),
+        p(fd.mixed, DRIVEN, unknown=(fd.JointEffort("f", "hinge"),), **HALF),
+    ),
+    Case(
+        lambda: run(HINGED, events=(Event("e", "hinge.angle"), Event("e", "hinge.angle_rate"))),
+        lambda: run(HINGED, events=(Event("e", "hinge.angle"), Event("f", "hinge.angle_rate"))),
+    ),
+    Case(
+        lambda: run(HINGED, events=(Event("e", lambda t, s: s.q("bra")),)),
+        lambda: run(HINGED, events=(Event("e", lambda t, s: s.position("bar.b")[1]),)),
+    ),
+    Case(
+        lambda: run(HINGED, events=(Event("e", lambda t, s: np.nan),)),
+        lambda: run(HINGED, events=(Event("e", lambda t, s: t - 0.1),)),
+    ),
+    Case(
+        lambda: run(felt(lambda t, s: (0, s.omega_bar("bra")[0], 0))),
+        lambda: run(felt(lambda t, s: (0, s.omega_bar("bar")[0], 0))),
+    ),
+    Case(
+        p(fd.piecewise, [0.0, 1.0, 2.0], [[1.0], [1.0, 2.0]]),
+        p(fd.piecewise, [0.0, 1.0, 2.0], [[1.0, 0.0], [1.0, 2.0]]),
+    ),
+    Case(lambda: fd.steady(EVENLY, speeds=5.0), lambda: fd.steady(EVENLY, speeds=[5.0])),  # type: ignore[arg-type]
+    Case(
+        lambda: run(felt(lambda t, s, calls=[]: (0, calls.append(t) or len(calls), 0))),
+        lambda: run(felt(lambda t, s: (0, t, 0))),
+    ),
 ]
 CASES, NAMES = numbered(
     {

@@ -177,7 +177,7 @@ def test_a_bushing_that_turns_with_both_its_ends_is_no_bearing(own):
     scene = fd.Scene(
         (fd.Body("hub", hub), fd.Body("disc", disc, omega_bar=(0, 0, own))),
         (fd.Joint("bearing", "revolute", "ground.O", "hub.c"),),
-        drivers=(fd.Driver("motor", "bearing", lambda t: 100.0 * t),),
+        drivers=(fd.Driver("motor", "bearing", fd.polynomial(0, 100.0)),),
         forces=(fd.Bushing("mount", "hub.c", "disc.c", (4e5, 4e5, 1e8, 3e3, 3e3, 1e6)),),
         ground={"O": (0, 0, 0)},
     )

@@ -17,6 +17,7 @@ import prep_structure_cases
 import pytest
 from said import numbered, texts_of
 
+import ffr_prep as fp
 from ffr_prep.common.errors import ComputationError, InputError
 
 # What is a part of a message, or one made elsewhere.
@@ -63,3 +64,32 @@ def test_every_text_has_a_case():
     said = [message(k) for k in range(len(CASES))]
     missing = {m: [t.pattern for t in found if not any(map(t.search, said))] for m, found in texts().items()}
     assert {m: without for m, without in missing.items() if without} == {}
+
+
+STEEL_BAR = fp.Member(fp.circle(0.02), fp.material("steel"))
+BAR = fp.named(fp.polyline([(0, 0, 0), (1, 0, 0)], STEEL_BAR), root=(0, 0, 0))
+ROOT_END = fp.InterfaceRegion("root")
+SHEET = fp.Shell(0.01, fp.material("steel"))
+REQUEST = fp.Request(name="bar", reference=fp.FixedTo("root"), reduction=fp.Guyan())
+SQUARE = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)]
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        lambda: fp.Member("tube", STEEL_BAR.material),
+        lambda: fp.Member(STEEL_BAR.section, "steel"),
+        lambda: fp.Shell(0.01, "steel"),
+        lambda: fp.polyline([(0, 0, 0), (1, 0, 0)], STEEL_BAR.section),
+        lambda: fp.panel(SQUARE, STEEL_BAR, elements=(2, 2)),
+        lambda: fp.panel(SQUARE, SHEET, elements=2),
+        lambda: fp.from_frame(BAR, ROOT_END),
+        lambda: fp.from_mesh(BAR, STEEL_BAR.material, [ROOT_END]),
+        lambda: fp.reduce(BAR, REQUEST),
+        lambda: fp.Request(name="bar", reference=fp.FixedTo("root"), reduction=4),
+        lambda: fp.with_reference(fp.rigid_body("a", mass=1.0, inertia=(1, 1, 1)), "mean-axis"),
+    ],
+)
+def test_what_is_of_another_type_is_refused_in_a_sentence(wrong):
+    with pytest.raises(InputError, match="; give "):
+        wrong()

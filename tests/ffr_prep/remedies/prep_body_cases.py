@@ -219,5 +219,18 @@ EXCHANGE = [
         lambda: common_format.normal_coordinates(DEPENDENT, np.eye(3)),
         lambda: common_format.normal_coordinates(np.eye(3), np.eye(3)),
     ),
+    Case(
+        lambda: fp.rigid_body("a", mass=1.0, inertia=(1, 1, 1), points=[(0, 0, 0)]),  # type: ignore[arg-type]
+        lambda: fp.rigid_body("a", mass=1.0, inertia=(1, 1, 1), points={"pin": (0, 0, 0)}),
+    ),
+    Case(
+        lambda: fp.rigid_body("a", mass=1.0, inertia=(1, (1, 2), 1)),  # type: ignore[arg-type]
+        lambda: fp.rigid_body("a", mass=1.0, inertia=(1, 1, 1)),
+    ),
+    Case(lambda: fp.damped(CLOUD, ratios=0.01), lambda: fp.damped(CLOUD, ratios=[0.01])),  # type: ignore[arg-type]
+    Case(
+        lambda: fp.with_reference(CLOUD, "mean-axis"),  # type: ignore[arg-type]
+        lambda: fp.with_reference(CLOUD, fp.MeanAxis()),
+    ),
 ]
 CASES = INTEGRALS + PARTS + TIES + REST + EXCHANGE

@@ -149,5 +149,6 @@ DRAWINGS = [
     Case(p(meshed, "2 2 1 1 1 2 3", members={"edge": MEMBER}), BARS),
     Case(p(read, "Point(1) = {0, 0, 0};\n", members={"edge": MEMBER}), BARS),
     Case(p(read, "Point(1) = {0, 0, 0};\n", shells={"roof": SHEET}), SHEETS),
+    Case(p(read, members=MEMBER), BARS),
 ]
 CASES = SECTIONS + ENTRIES + FRAMES + DRAWINGS

@@ -1,0 +1,59 @@
+"""Whether the rates that a Python function of time tells beside its values are theirs.
+
+Next to each time, at either side, they are compared with how the values change over a ten-thousandth of what the times are
+apart, and second derivatives with how the told rates change. One side is enough, as a function may have a kink just there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from ffr_prep.common.arrays import Array
+
+LOOKED = 17  # times that are looked at, of those given
+BESIDE, ALONE = 1e-4, 1e-6  # of the spacing of times, how far beside them; and [s] beside a single one
+WRONG, MOVES = 0.05, 0.05  # of the largest rate: how far a told one is off, and from where on it counts
+FARTHER = 10.0  # times as far beside them, where the same must be found
+
+
+class WrongRate(NamedTuple):
+    """At a time [s], what is told, what the numbers before it change by, and which derivative: 1 or 2."""
+
+    time: float
+    told: float
+    found: float
+    order: int
+
+
+def wrong_rate(function: Callable[[float], Array], times: Array, order: int) -> WrongRate | None:
+    """The worst of the derivatives up to an order, where most of a motion at these times has others than are told.
+
+    function : t [s] -> (3,) value, rate and second derivative. None, too, where it has no values beside the times
+    """
+    chosen: Array = times[np.unique(np.linspace(0, times.size - 1, LOOKED).round().astype(int))]
+    apart = BESIDE * float(np.diff(times).min()) if times.size > 1 else ALONE
+    apart = max(apart, 1e4 * float(np.spacing(np.abs(times[-1]))))
+    try:
+        at, *beside = (np.array([function(t + side * apart) for t in chosen]) for side in (0, -1, 1, -FARTHER, FARTHER))
+    except Exception:  # whatever a function of the user raises where it has no values
+        return None
+    for number in range(1, order + 1):
+        told: Array = at[:, number]
+        before = [other[:, number - 1] - at[:, number - 1] for other in beside]
+        near = _nearer(told, before[0] / -apart, before[1] / apart)
+        far = _nearer(told, before[2] / (-FARTHER * apart), before[3] / (FARTHER * apart))
+        off: Array = np.abs(near - told)
+        size: Array = np.maximum(np.abs(told), np.abs(near))
+        largest = float(size.max())
+        is_wrong = (off > WRONG * largest) & (np.abs(far - near) < 0.5 * off)
+        if 2 * np.count_nonzero(is_wrong) > int(np.count_nonzero(size > MOVES * largest)):
+            worst = int((off * is_wrong).argmax())
+            return WrongRate(float(chosen[worst]), float(told[worst]), float(near[worst]), number)
+    return None
+
+
+def _nearer(told: Array, before: Array, behind: Array) -> Array:
+    return np.where(np.abs(before - told) < np.abs(behind - told), before, behind)
