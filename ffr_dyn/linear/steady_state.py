@@ -57,6 +57,7 @@ from ffr_prep.common.errors import ComputationError, InputError
 
 ITERATIONS = 20  # of Newton's method
 TOLERANCE = 1e-9  # of its last step, rad or relative to the scene: the next would be its square
+STALLED = 1e-7  # the same, below which steps that shrink no more are the rounding of differences
 LARGEST = 0.5  # of a step, the same
 NEAR = 0.01  # the same, of steps that lead to no other steady motion
 LEAST_SHARE = 0.01  # of the speed, by which it is followed
@@ -490,7 +491,7 @@ def _newton(machine: Machine, x: Array) -> Steady | None:
         lam = _multipliers(about, about.forces - about.K @ y)
         x = moved(place, x, min(1.0, LARGEST / length) * y if length else y)
         about = matrices(machine, x, lam)
-        if length < TOLERANCE:
+        if length < TOLERANCE or (length < STALLED and length > 0.5 * min(lengths[:-1], default=np.inf)):
             steady = replace(steady, x=x, v=velocities(place, machine.screws, x), about=about)
             _require_balance(steady)
             return steady
