@@ -25,6 +25,7 @@ from ffr_prep.common.arrays import Array
 REACH = (
     2.0  # h omega and h times a rate of decay that an explicit term bears in a method whose own reach is not bounded
 )
+BEYOND = 1.0 + 1e-6  # a step at the limit itself may be above it by rounding
 MOST = 200  # velocities of a scene that is looked at, which takes a decomposition of that size
 
 
@@ -51,7 +52,7 @@ def told(system: System, method: Integrator, rates: Array) -> list[str]:
     reach = method.reach if np.isfinite(method.reach) else REACH
     notes, kind = [], type(method).__name__
     for force, rate in zip(forces_of(system.scene), rates, strict=True):
-        if method.step * rate > reach:
+        if method.step * rate > BEYOND * reach:
             other = "" if method.takes_forces or not force.stiff_coordinates else ", or ROS2"
             notes.append(
                 f"force {force.name!r} is too stiff for steps of {method.step:.3g} s, in which {kind} takes it explicitly: "
