@@ -126,7 +126,7 @@ def _newton(problem: _Problem, start: Equilibrium, share: float, iterations: int
             return Equilibrium(np.array([*path, there]), step.lam, beyond, tuple(steps), True)
         ahead = _ahead(step, beyond, M)
         if not ahead > BACK:
-            radius = 0.5 * step.length
+            radius = 0.5 * min(step.length, radius)
             continue
         path.append(there)
         x, lam, now, radius = there, step.lam, beyond, min(2 * radius if ahead > 0.5 * BACK else radius, LARGEST_STEP)

@@ -103,3 +103,23 @@ def test_a_chain_bends_by_more_than_its_links_in_few_steps():
     moments = [weight * (places[k:] - hinge).sum() for k, hinge in enumerate(hinges)]
     np.testing.assert_allclose([found[f"r{k}.angle"][0] for k in range(40)], -np.array(moments) / 1000.0, rtol=1e-8)
     assert found["l39.b.position"][0, 1] < -1.0
+
+
+@pytest.mark.slow
+def test_a_strut_of_many_links_falls_to_a_stable_equilibrium():
+    """Thirty links on springs, too tall to stand, a milliradian off: steps to the rows do not keep it from falling."""
+    link = fp.rigid_body("link", mass=0.1, inertia=(1e-5, 1e-4, 1e-4), points={"a": (-0.05, 0, 0), "b": (0.05, 0, 0)})
+    lean = np.pi / 2 + 1e-3
+    along = np.array([np.cos(lean), np.sin(lean), 0.0])
+    bodies = [fd.Body(f"l{k}", link, position=(0.05 + 0.1 * k) * along, rotation=(0, 0, lean)) for k in range(30)]
+    ends = ["ground.o", *(f"l{k}.b" for k in range(29))]
+    joints = [fd.Joint(f"r{k}", "revolute", end, f"l{k}.a") for k, end in enumerate(ends)]
+    free = [np.pi / 2, *[0.0] * 29]
+    springs = [fd.JointSpring(f"s{k}", f"r{k}", stiffness=60.0, free=free[k]) for k in range(30)]
+    found = fd.static(fd.Scene(bodies, joints, forces=springs, ground={"o": (0, 0, 0)}, gravity=(0, -9.81, 0)))
+    assert found.attributes["stable"]
+    places = np.array([found[f"l{k}.R"][0, 0] for k in range(30)])
+    moments = [0.981 * (places[k:] - found[f"l{k}.a.position"][0, 0]).sum() for k in range(30)]
+    bent = np.array([found[f"r{k}.angle"][0] for k in range(30)]) - free
+    np.testing.assert_allclose(60.0 * bent, -np.array(moments), rtol=1e-7)
+    assert found["l29.b.position"][0, 1] < -2.0
