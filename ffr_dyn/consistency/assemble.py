@@ -304,7 +304,8 @@ def seen_in_space(scene: Scene) -> Scene:
     joints close, and bodies that lack inertia across it have a trace of it."""
     if scene.plane != "auto":
         return scene
-    forms = {axis: levelled(with_traces(scene), normal) for normal, axis in enumerate(AXES)}
+    traced = with_traces(scene)
+    forms = {axis: levelled(traced, normal) for normal, axis in enumerate(AXES)}
     if all(form is scene for form in forms.values()):
         return in_space(scene)
     return in_space(forms.get(_in_plane_or_space(scene, 0.0).scene.plane, scene))
