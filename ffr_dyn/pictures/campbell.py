@@ -55,7 +55,8 @@ def draw_campbell(result: Result, path: str | Path) -> Path:
             for axes, at in product((upper, lower), ends):
                 axes.axvline(at, color=RED, linewidth=1.0)
             lower.annotate(f" unstable from {' to '.join(f'{at:.4g}' for at in ends)}", (one["speed"], 0.9),
-                           xycoords=("data", "axes fraction"), color=RED, fontsize=SMALL)  # fmt: skip
+                           xycoords=("data", "axes fraction"), color=RED, fontsize=SMALL,
+                           bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.85, "pad": 1})  # fmt: skip
         low, high = lower.get_ylim()
         lower.set(ylim=(min(low, -LEAST), max(high, LEAST)), ylabel="damping [%]", xlabel="speed [rad/s]")
         upper.secondary_xaxis("top", functions=(_to_rpm, _from_rpm)).set_xlabel("speed [rpm]")
