@@ -47,6 +47,7 @@ from ffr_dyn.kernels.functions import ROUNDING as OF_TIME
 from ffr_dyn.kernels.functions import evaluate_functions
 from ffr_dyn.kernels.tables import SINCE, Functions
 from ffr_dyn.results.result import Result
+from ffr_prep.body import remembered
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.units import natural
 
@@ -385,7 +386,11 @@ def roundings(run: Result) -> dict[str, float]:
 
 
 def _spans_and_sizes(run: Result) -> tuple[dict[str, float], dict[str, float]]:
-    """The largest range of a component of every output, and the largest number of every kind."""
+    """The largest range of a component of every output, and the largest number of every kind; found once."""
+    return remembered(run, "spans and sizes", lambda: _found_spans_and_sizes(run))
+
+
+def _found_spans_and_sizes(run: Result) -> tuple[dict[str, float], dict[str, float]]:
     spans: dict[str, float] = {}
     sizes: dict[str, float] = {}
     for names in _batches(run, (name for name in run.quantities if not name.startswith("constraint."))):
