@@ -38,14 +38,17 @@ def vibrations(assembled: Assembled, time: float) -> Vibrations:
         return Vibrations(assembled, np.zeros(0), np.zeros(0), np.zeros((place.v_size, 0)))
     now = evaluate(evaluator(system), time, assembled.x, assembled.v)
     Z = free_motions(now.jacobian, total_mass_matrix(scene, place, assembled.x))
-    square, rate = np.zeros(place.v_size), np.zeros((place.v_size, place.v_size))
+    square = np.zeros(place.v_size)
     for b, body in enumerate(scene.bodies):
         square[place.q_dot(b)] = body.model.omega2
-        rate[place.q_dot(b), place.q_dot(b)] = damping_matrix(body.model, body.damping)
     omega2, vectors = scipy.linalg.eigh(Z.T @ (square[:, None] * Z))
     bent = omega2 > 1e-9 * omega2.max(initial=0.0)
     omega, motions = np.sqrt(omega2[bent]), Z @ vectors[:, bent]
-    return Vibrations(assembled, omega, np.einsum("va,vw,wa->a", motions, rate, motions) / (2.0 * omega), motions)
+    lost = np.zeros(omega.size)
+    for b, body in enumerate(scene.bodies):  # one by one, as damping does not couple them
+        own = motions[place.q_dot(b)]
+        lost += np.sum(own * (damping_matrix(body.model, body.damping) @ own), axis=0)
+    return Vibrations(assembled, omega, lost / (2.0 * omega), motions)
 
 
 def lasting(of: Vibrations, step: float) -> float:
