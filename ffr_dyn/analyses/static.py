@@ -114,7 +114,10 @@ def _lowest_stiffness(at: Evaluator, assembled: Assembled, found: Equilibrium, t
             "look at the forces and formulas that act on it"
         )
     if not found.found and rigid_freedom(assembled.system.scene, assembled, time):
-        raise _not_held(assembled, time, x, Z @ vectors[:, 0], f"no equilibrium was found in {len(found.steps)} steps")
+        tried = f"no equilibrium was found in {len(found.steps)} steps"
+        raise _not_held(
+            assembled, time, x, Z @ vectors[:, 0], tried, " where they ended", " (or run forward with damping)"
+        )
     if not found.found:
         motion = named_motion(at.system.scene, at.system.layout, x, Z @ vectors[:, 0])
         raise ComputationError(
@@ -142,14 +145,16 @@ def _with_flutter(values: Array) -> tuple[float, float]:
     return float(values.real.min()), float(frequencies.min()) if met.size else 0.0
 
 
-def _not_held(assembled: Assembled, time: float, x: Array, direction: Array, what: str) -> InputError:
+def _not_held(
+    assembled: Assembled, time: float, x: Array, direction: Array, what: str, there: str = "", otherwise: str = ""
+) -> InputError:
     system = assembled.system
     motion = named_motion(system.scene, system.layout, x, direction)
     rigid = rigid_freedom(system.scene, assembled, time)
     counts = counted(assembled.degrees_of_freedom, rigid, sum(system.layout.n), len(assembled.redundant))
     return InputError(
-        f"{what}: nothing holds the motion {motion}; add a joint, a driver or a spring that does, or start nearer to an "
-        f"equilibrium ({counts})"
+        f"{what}: nothing holds the motion {motion}{there}; add a joint, a driver or a spring that does, or start nearer to "
+        f"an equilibrium{otherwise} ({counts})"
     )
 
 
