@@ -1,18 +1,20 @@
 """Static equilibrium: where a scene stays at rest under gravity, loads and springs, its drivers held still.
 
-How it is found, `ffr_dyn.consistency.equilibrium` says. In minimal coordinates of unit mass the tangent stiffness tells what
-holds the scene there: a motion without stiffness is held by nothing, one of negative stiffness is unstable.
+How it is found, `ffr_dyn.analyses.equilibria.equilibrium` says. In minimal coordinates of unit mass the tangent stiffness
+tells what holds the scene there: a motion without stiffness is held by nothing, one of negative stiffness is unstable.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from ffr_dyn.analyses.equilibria.equilibrium import Equilibrium, equilibrium, jumped
 from ffr_dyn.analyses.integration import with_all_reactions
 from ffr_dyn.analyses.outcome import needed, result_of, turned_along
 from ffr_dyn.analyses.registry import OfMoment
@@ -20,7 +22,6 @@ from ffr_dyn.analyses.settings import MomentSettings
 from ffr_dyn.analyses.states import held
 from ffr_dyn.consistency.assemble import Assembled, assemble, seen_in_space
 from ffr_dyn.consistency.doubts import checked
-from ffr_dyn.consistency.equilibrium import Equilibrium, equilibrium, jumped
 from ffr_dyn.consistency.evaluation import (
     Evaluator,
     copied,
@@ -76,10 +77,15 @@ def static(
     selected(assembled.system, needed(scene, outputs))
     at = evaluator(assembled.system)
     widths = _widths(at, assembled.x)
-    found = equilibrium(assembled.system, time, assembled.x, widths)
+    found = equilibrium(assembled.system, time, assembled.x, widths, partial(_is_mechanism, assembled, time))
     lowest, flutter = _lowest_stiffness(at, assembled, found, time)
     branch = jumped(assembled.system, time, assembled.x, widths, found)
     return _result(scene, assembled, at, found, time, (lowest, flutter, branch), outputs, path)
+
+
+def _is_mechanism(assembled: Assembled, time: float) -> bool:
+    """Whether its bodies can move without being deformed."""
+    return rigid_freedom(assembled.system.scene, assembled, time) > 0
 
 
 def _widths(at: Evaluator, x: Array) -> Array:
@@ -113,7 +119,7 @@ def _lowest_stiffness(at: Evaluator, assembled: Assembled, found: Equilibrium, t
             f"one, or a force jumps, has a kink or a pole near there, along {motion}; start nearer to an equilibrium, or "
             "look at the forces and formulas that act on it"
         )
-    if not found.found and rigid_freedom(assembled.system.scene, assembled, time):
+    if not found.found and _is_mechanism(assembled, time):
         tried = f"no equilibrium was found in {len(found.steps)} steps"
         raise _not_held(
             assembled, time, x, Z @ vectors[:, 0], tried, " where they ended", " (or run forward with damping)"
@@ -187,7 +193,8 @@ def _result(
         **described(scene),
         "analysis": "static equilibrium",
         "method": f"Newton's method, {len(found.steps)} steps"
-        + f" in {found.load_steps} load steps" * (found.load_steps > 1),
+        + f" in {found.load_steps} load steps" * (found.load_steps > 1)
+        + ", at the end from where the scene rests that is let go" * found.relaxed,
         "evaluations": int(at.work.info[EVALUATIONS]),
         "degrees_of_freedom": assembled.degrees_of_freedom,
         "stable": int(stable),

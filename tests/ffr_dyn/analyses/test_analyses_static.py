@@ -112,7 +112,9 @@ def test_time_dependent_loads_are_those_of_the_time():
 
 def test_a_free_mechanism_is_refused_by_name():
     free = Scene((Body("stone", rigid_body("stone", mass=1.0, inertia=(1, 1, 1), points={"c": (0, 0, 0)})),), gravity=G)
-    with pytest.raises(InputError, match=r"nothing holds the motion stone .* where they ended; .* run forward with damping"):
+    with pytest.raises(
+        InputError, match=r"nothing holds the motion stone .* where they ended; .* run forward with damping"
+    ):
         static(free)
     with pytest.raises(InputError, match=r"nothing holds the motion A\.angle"):
         static(replace(hanging(0.3), gravity=(0, 0, -9.81)))

@@ -9,27 +9,31 @@ s = 0 where K is positive on the motions that the rows leave free, and the step 
 met on the way, stiff bodies bend and turn without being stretched, and few steps do for any load. Where Newton's step fails,
 s is about the smallest that makes it so: a step downhill, as of a motion under great damping, so that what begins far away
 comes to a stable equilibrium; where the rows are far from met by then, a step meets them alone. A step is taken again with
-half the radius where the one that would follow, with the same tangent, is longer or goes back. What comes nowhere so bears
-its loads bit by bit. (Nocedal & Wright 2006, ch. 16; Deuflhard 2004, ch. 3.)
+half the radius where the one that would follow, with the same tangent, is longer or goes back. A mechanism that comes
+nowhere soon is let go from the start, and steps go on from where it rests (`ffr_dyn.analyses.equilibria.relaxation`). What
+comes nowhere at all bears its loads bit by bit. (Nocedal & Wright 2006, ch. 16; Deuflhard 2004, ch. 3.)
 """
 
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import LinAlgWarning, eigvalsh_tridiagonal, ldl, lu_factor, lu_solve
 
+from ffr_dyn.analyses.equilibria.relaxation import Rest, may_rest, relaxed
 from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.consistency.evaluation import locked, total_mass_matrix, unit_rows
+from ffr_dyn.equations.forces_at_rest import is_load
 from ffr_dyn.equations.layout import moved
 from ffr_dyn.equations.statics import Balance, balance
+from ffr_dyn.scene.force_kinds import forces_of
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError, InputError
 
-ITERATIONS = 100
+ITERATIONS, SOON = 100, 30
 LARGEST_STEP = 1.0  # rad, or part of the scene's size
 TOLERANCE = 1e-9  # of the last step, the same: the next would be its square
 LEAST_SHIFT = 1e-3  # of what takes a step of the radius where nothing is stiff
@@ -54,6 +58,7 @@ class Equilibrium:
     found      : whether the last step was Newton's, and below the tolerance
     load_steps : parts in which weight and loads were applied
     borne      : the share of them for which an equilibrium was found by load steps, where not all are
+    relaxed    : whether it was let go, and steps began where it came to rest
     """
 
     path: Array
@@ -63,6 +68,7 @@ class Equilibrium:
     found: bool
     load_steps: int = 1
     borne: float = 0.0
+    relaxed: bool = False
 
 
 @dataclass(frozen=True)
@@ -81,17 +87,33 @@ class _Step:
         return lu_solve(self.factors, left, check_finite=False)[: self.y.size]
 
 
-def equilibrium(system: System, time: float, x: Array, sizes: Array) -> Equilibrium:
+def equilibrium(
+    system: System, time: float, x: Array, sizes: Array, mechanism: Callable[[], bool] = lambda: False
+) -> Equilibrium:
     """From the positions x at the time [s]; sizes (V,) of what counts as a step of one.
 
-    What comes to no equilibrium under all loads at once bears them bit by bit.
+    What comes to no equilibrium soon is let go if it can move without being deformed, which `mechanism` tells; what comes to
+    none under all loads at once bears them bit by bit.
 
     Raises ComputationError where the forces are not finite.
     """
     problem = _Problem(system, time, total_mass_matrix(system.scene, system.layout, x), sizes)
     start = Equilibrium(x[None], None, problem.balance(x, None, {}, 1.0), (), False)
+    found = _newton(problem, start, 1.0, SOON)
+    if found.found:
+        return found
+    if mechanism() and may_rest(system, time, x, sizes) and (rest := relaxed(system, time, x, sizes)) is not None:
+        return _from_rest_on(problem, rest, found)
     found = _newton(problem, start, 1.0, ITERATIONS)
     return found if found.found else _by_load_steps(problem, start, found)
+
+
+def _from_rest_on(problem: _Problem, rest: Rest, before: Equilibrium) -> Equilibrium:
+    """By steps from where a scene rests that was let go."""
+    now = problem.balance(rest.way[-1], None, rest.angles, 1.0)
+    there = _newton(problem, Equilibrium(rest.way, None, now, (), False), 1.0, SOON)
+    path = np.concatenate([rest.way, there.path])
+    return replace(there, path=path, steps=(*before.steps, *there.steps), relaxed=True)
 
 
 def _by_load_steps(problem: _Problem, start: Equilibrium, failed: Equilibrium) -> Equilibrium:
@@ -138,11 +160,14 @@ def jumped(system: System, time: float, x: Array, sizes: Array, found: Equilibri
 
     Newton's steps may lead over a fold, behind which small loads have no equilibrium nearby, or over a pole of a force. As
     the loads are taken off bit by bit, the scene then does not come to where small ones bring it from the start. That is
-    looked at, as loads that grow are: both by changes small enough to stay on their branch.
+    looked at, as loads that grow are: both by changes small enough to stay on their branch. Where nothing but loads acts,
+    small ones lead where large ones do.
     """
+    if not any(system.layout.n) and all(is_load(force) for force in forces_of(system.scene)):
+        return ""
     problem = _Problem(system, time, total_mass_matrix(system.scene, system.layout, x), sizes)
     start = Equilibrium(x[None], None, problem.balance(x, None, {}, 1.0), (), False)
-    small, reached = _lightly_loaded(problem, start)
+    small, reached = _lightly_loaded(problem, start, SOON if found.relaxed else ITERATIONS)
     if not small.found or _apart(problem, x, small.path[-1]) > _apart(problem, x, found.path[-1]):
         return ""  # small loads do not know of where the scene is drawn
     far = _apart(problem, x, found.path[-1])
@@ -166,14 +191,14 @@ def jumped(system: System, time: float, x: Array, sizes: Array, found: Equilibri
     )
 
 
-def _lightly_loaded(problem: _Problem, start: Equilibrium) -> tuple[Equilibrium, float]:
+def _lightly_loaded(problem: _Problem, start: Equilibrium, most: int) -> tuple[Equilibrium, float]:
     """The equilibrium near the start under a small share of the loads, and this share.
 
     Newton's steps may lead over a fold even there: what a trace of the loads brings is followed to that share, at once
-    where the response is nearly linear.
+    where the response is nearly linear. most : steps to each
     """
-    trace = _newton(problem, start, TRACE, ITERATIONS)
-    at_once = _newton(problem, trace if trace.found else start, UNLOADED, ITERATIONS)
+    trace = _newton(problem, start, TRACE, most)
+    at_once = _newton(problem, trace if trace.found else start, UNLOADED, most)
     linear = at_once.found and _contracts(at_once, LINEAR)
     if not trace.found or (linear and _returns(problem, at_once, trace, TRACE)):
         return at_once, UNLOADED

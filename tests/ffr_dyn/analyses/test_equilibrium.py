@@ -10,11 +10,11 @@ from boxes import STEEL
 from test_motion import cases
 from test_parts import beam, clamped
 
+from ffr_dyn.analyses.equilibria.equilibrium import Equilibrium, equilibrium
 from ffr_dyn.analyses.linearise import linearise
 from ffr_dyn.analyses.states import held
 from ffr_dyn.analyses.static import static
 from ffr_dyn.consistency.assemble import assemble, in_space
-from ffr_dyn.consistency.equilibrium import Equilibrium, equilibrium
 from ffr_dyn.consistency.evaluation import evaluator
 from ffr_dyn.consistency.mobility import counted
 from ffr_dyn.consistency.tangent import chart, derivative, rates, sizes, state, state_matrix
