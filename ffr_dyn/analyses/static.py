@@ -112,7 +112,9 @@ def _lowest_stiffness(at: Evaluator, assembled: Assembled, found: Equilibrium, t
         return float("inf"), 0.0
     K = Z.T @ found.balance.stiffness @ Z
     values, vectors = np.linalg.eigh(0.5 * (K + K.T))
-    if not found.found and values[0] > ROUNDING * np.abs(values).max():
+    applied = np.linalg.solve(M, found.balance.forces) / sizes(at)
+    limit = NEUTRAL * np.abs(applied).max() + ROUNDING * np.abs(values).max()
+    if not found.found and values[0] > limit:
         motion = named_motion(at.system.scene, at.system.layout, x, Z @ np.linalg.solve(K, Z.T @ found.balance.forces))
         raise ComputationError(
             f"no equilibrium was found in {len(found.steps)} steps, though what moves is held: the start is too far from "
@@ -130,8 +132,6 @@ def _lowest_stiffness(at: Evaluator, assembled: Assembled, found: Equilibrium, t
             f"no equilibrium was found in {len(found.steps)} steps: bodies or springs buckle along {motion}; of loads "
             f"that grow, {found.borne:.2g} of their size have one; use smaller loads, or run forward with damping"
         )
-    applied = np.linalg.solve(M, found.balance.forces) / sizes(at)
-    limit = NEUTRAL * np.abs(applied).max() + ROUNDING * np.abs(values).max()
     if not (symmetric := bool(np.abs(K - K.T).max() <= SYMMETRIC * np.abs(K).max())):
         values, vectors = np.linalg.eig(K)  # the symmetric part says nothing then, of what holds and of stability
     loose = int(np.argmin(np.abs(values)))

@@ -55,7 +55,7 @@ ATTEMPTS, HALVINGS = 40, 3  # shifts four times as large each; and between the l
 class Equilibrium:
     """Positions (N, X) on the way, multipliers and balance at the last, and lengths of all steps tried, relative to sizes.
 
-    found      : whether the last step was Newton's, and below the tolerance
+    found      : whether the last step was below the tolerance
     load_steps : parts in which weight and loads were applied
     borne      : the share of them for which an equilibrium was found by load steps, where not all are
     relaxed    : whether it was let go, and steps began where it came to rest
@@ -144,7 +144,8 @@ def _newton(problem: _Problem, start: Equilibrium, share: float, iterations: int
         there = moved(problem.system.layout, x, step.y)
         beyond = problem.balance(there, step.lam, now.angles, share)
         steps.append(step.length)
-        if step.shift == 0 and step.length < TOLERANCE:
+        # of a motion that nothing holds there is no Newton step, and no force
+        if step.length < (TOLERANCE if step.shift == 0 else TOLERANCE * radius):
             return Equilibrium(np.array([*path, there]), step.lam, beyond, tuple(steps), True)
         ahead = _ahead(step, beyond, M)
         if not ahead > BACK:
