@@ -174,7 +174,8 @@ def _body_work(m: Model, keeps_terms: bool) -> BodyWork:
         **_zeros(omega=(B + 1, 3), s=(B, 3), J=(B, 3, 3), inverse=(B, 2), g=9 * terms, l=3 * terms),
         sorted=np.zeros(42 * longest + 6 * LANES),
         **_zeros(H=3 * E, L=(B, 6, 6), f=V, acc=V, T=(B, 3, 3), rigid=(B, 6)),
-        **_zeros(more=V, settled=V if m.bodies.coupled_damping.size else 0, solved=V * (m.relaxation > 0.0)),
+        **_zeros(more=V, settled=V if m.bodies.coupled_damping.size else 0),
+        **_zeros(solved=V * (m.relaxation > 0.0), search=(2, V * (m.relaxation > 0.0))),
     )
 
 
@@ -185,7 +186,8 @@ def _row_work(m: Model) -> RowWork:
     column = np.repeat(np.arange(K), np.diff(m.pattern.column_start))
     stored = LANES * int(size.sum() + size[column].sum())
     return RowWork(
-        **_zeros(Phi=C, nu=C, gamma=C, lam=C, left=C, reacted=C * (m.relaxation > 0.0)),
+        **_zeros(Phi=C, nu=C, gamma=C, lam=C, left=C),
+        **_zeros(reacted=C * (m.relaxation > 0.0), search=(5, C * (m.relaxation > 0.0))),
         **_zeros(jac=(K * D, 9, LANES), kept=(K * D, 9, LANES), X=K * D * 12 * LANES, Y=12 * LANES),
         **_zeros(scale=K * LANES, least=K * LANES, pivots=K * LANES, step=K * LANES),
         **_zeros(compliance=K * LANES, pull=K * LANES, relief=K * LANES),

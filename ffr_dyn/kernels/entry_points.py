@@ -86,10 +86,12 @@ from ffr_dyn.kernels.tables import (
     Tables,
     Vector,
 )
-from ffr_dyn.kernels.vectors import add_scaled, copy, fill
+from ffr_dyn.kernels.vectors import add_scaled, copy, fill, product
 
-PASSES = 20  # at most, where rows depend on one another
-SETTLES = 0.9  # of what is left: a pass that leaves more is the last
+PASSES, UNMOVED = (
+    60,
+    1e-15,
+)  # at most, where rows depend on one another; and of accelerations, what the last one changes
 GROSS = 1.0  # m, -: of a violation that no projection puts right
 SETTLING, SETTLED = 60, 1e-11  # iterations with a damping matrix, and the relative change at which they end
 UNMET = 1e3  # tolerances, beyond which a violation that the projection does not take back is no drift
@@ -289,23 +291,52 @@ def project(r: Tables, value: Vector) -> int:
 
 
 @inlined
+def miss(r, acc, lam, out):
+    """out (C,) = Phi_q acc less what stiff forces yield to lam (C,)."""
+    rw = r.work.rows
+    constraint_rates(r.model.bodies.where, r.model.markers, r.model.rows, rw.jac, r.work.markers.phi, acc, out)
+    subtract_yield(r.model.rows, rw, lam, out)
+
+
+@inlined
 def refine(r, target):
-    """Take out again what relaxation of the multiplier matrix does to a solution (method of multipliers; Bayo & Ledesma,
-    Nonlinear Dynamics 9 (1996) 113-130)."""
-    m, bw, rw, before = r.model, r.work.bodies, r.work.rows, 0.0
-    for number in range(1, PASSES):
-        constraint_rates(m.bodies.where, m.markers, m.rows, rw.jac, r.work.markers.phi, bw.acc, rw.left)
-        add_scaled(rw.left, rw.left, -1.0, target)
-        subtract_yield(m.rows, rw, rw.lam, rw.left)
-        left = largest(rw.left)
-        if number > 1 and not left < SETTLES * before:
+    """Take out again what relaxation of the multiplier matrix S does to a solution: conjugate residuals of S lam = b, which
+    the relaxed matrix preconditions (Saad 2003, 6.8). Each pass takes out one direction in which S is less than the
+    relaxation, of which a long row of links has some. What rows contradict one another by has no part in them.
+    """
+    bw, rw, starts = r.work.bodies, r.work.rows, r.model.rows.start
+    z, z_rate, way, way_rate, q = rw.search[0], rw.search[1], rw.search[2], rw.search[3], rw.search[4]
+    z_acc, way_acc = bw.search[0], bw.search[1]
+    miss(r, bw.acc, rw.lam, rw.left)
+    add_scaled(rw.left, rw.left, -1.0, target)
+    copy(bw.more, bw.acc)
+    project(r, rw.left)
+    gather_rows(starts, rw.step, z)
+    copy(z_acc, bw.acc)
+    miss(r, z_acc, z, z_rate)  # -S z
+    copy(way, z)
+    copy(way_acc, z_acc)
+    copy(way_rate, z_rate)
+    above = -product(z, z_rate)
+    for _ in range(PASSES):
+        project(r, way_rate)
+        gather_rows(starts, rw.step, q)
+        below = product(way_rate, q)
+        if not (above > 0.0 and below > 0.0):
             break
-        before = left
-        copy(bw.more, bw.acc)
-        project(r, rw.left)
-        add_scaled(bw.acc, bw.more, 1.0, bw.acc)
-        gather_rows(m.rows.start, rw.step, rw.left)
-        add_scaled(rw.lam, rw.lam, 1.0, rw.left)
+        share = above / below
+        add_scaled(rw.lam, rw.lam, share, way)
+        add_scaled(bw.more, bw.more, share, way_acc)
+        if share * largest(way_acc) <= UNMOVED * largest(bw.more):
+            break
+        add_scaled(z, z, share, q)
+        add_scaled(z_acc, z_acc, share, bw.acc)
+        miss(r, z_acc, z, z_rate)
+        before, above = above, -product(z, z_rate)
+        add_scaled(way, z, above / before, way)
+        add_scaled(way_acc, z_acc, above / before, way_acc)
+        add_scaled(way_rate, z_rate, above / before, way_rate)
+    copy(bw.acc, bw.more)
 
 
 @solve.where(has_dependent_rows)

@@ -225,6 +225,7 @@ class BodyWork(NamedTuple):
     more: F1  # (V,) scratch
     settled: F1  # (V,) scratch where damping couples elastic coordinates
     solved: F1  # (V,) scratch where rows depend on one another
+    search: F2  # (2, V) likewise
 
 
 class MarkerWork(NamedTuple):
@@ -271,6 +272,7 @@ class RowWork(NamedTuple):
     lam: F1  # (C,)
     left: F1  # (C,) scratch
     reacted: F1  # (C,) scratch where rows depend on one another
+    search: F2  # (5, C) likewise
     scale: F1  # (8 K,) what the entry of S on the diagonal is at least
     least: F1  # (8 K,) what it is taken for where it is less
     compliance: F1  # (8 K,) of the rows of stiff forces 1 / (gamma h d + (gamma h)^2 k)

@@ -164,6 +164,15 @@ def copy(target, source):
 
 
 @kernel
+def product(a, b):
+    """The sum of a[k] b[k]."""
+    result = 0.0
+    for k in range(a.size):
+        result += a[k] * b[k]
+    return result
+
+
+@kernel
 def add_scaled(target, base, factor, direction):
     """target = base + factor direction."""
     for k in range(target.size):
