@@ -31,6 +31,7 @@ from ffr_prep.model.model import Model
 from ffr_prep.model.reactions import in_equilibrium, known_loads
 from ffr_prep.model.reference import ReferenceConditions, at_interfaces, conditions_of_part, functionals
 from ffr_prep.reduction.basis import Basis, Reduction, check_basis, factorised
+from ffr_prep.reduction.cut_error import cut_doubt, cut_error
 from ffr_prep.reduction.held_body import held_body, needs_held_body
 from ffr_prep.reduction.mesh_error import mesh_error
 from ffr_prep.reduction.quality import assess, completed
@@ -126,7 +127,7 @@ def reduce(
     request = replace(request, reference=reference)
     try:
         whole = _reduced(model, request, progress, advance)
-        whole = replace(whole, parts=tuple(_parts(model, request, progress, advance)))
+        whole = _with_cut_error(replace(whole, parts=tuple(_parts(model, request, progress, advance))))
         return with_damping(whole, request.damping)
     except ComputationError:
         model.diagnose()
@@ -165,6 +166,12 @@ def _parts(model: Model, request: Request, progress: Stages, advance: Advance) -
             yield _reduced(part, own, lambda stage, of=of: progress(f"{of}: {stage}"), advance)  # type: ignore[misc]
         except InputError as error:
             raise InputError(f"{of}: {error}") from None
+
+
+def _with_cut_error(body: FlexibleBody) -> FlexibleBody:
+    found = cut_error(body)
+    warnings = [*body.provenance["warnings"], *filter(None, [cut_doubt(found)])]
+    return replace(body, provenance={**body.provenance, **found, "warnings": warnings})
 
 
 def _reduced(model: Model, request: Request, progress: Stages, advance: Advance) -> FlexibleBody:
