@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from importlib.metadata import version
 from typing import Any
@@ -125,9 +125,10 @@ def reduce(
         )
     reference = at_interfaces(request.reference, model.coupled.names, model.coupled.positions)
     request = replace(request, reference=reference)
+    parts = model.cut(request.parts) if model.cut and request.parts is not None else ()
     try:
         whole = _reduced(model, request, progress, advance)
-        whole = _with_cut_error(replace(whole, parts=tuple(_parts(model, request, progress, advance))))
+        whole = _with_cut_error(replace(whole, parts=tuple(_parts(parts, request, progress, advance))))
         return with_damping(whole, request.damping)
     except ComputationError:
         model.diagnose()
@@ -147,22 +148,22 @@ def _check_points(model: CoupledModel) -> None:
             )
 
 
-def _parts(model: Model, request: Request, progress: Stages, advance: Advance) -> Iterator[FlexibleBody]:
+def _parts(
+    parts: Sequence[Callable[[], Model]], request: Request, progress: Stages, advance: Advance
+) -> Iterator[FlexibleBody]:
     """The parts of the body, reduced one after the other."""
-    if request.parts is None or model.cut is None:
-        return
-    progress("cut into parts")
-    models = model.cut(request.parts)
-    for k, part in enumerate(models, 1):
-        own = replace(
-            request,
-            name=f"{request.name}_{k}",
-            reference=conditions_of_part(request.reference, part.coupled.names),
-            quality=None,
-            parts=None,
-        )
-        of = f"part {k} of {len(models)}"
+    for k, make in enumerate(parts, 1):
+        of = f"part {k} of {len(parts)}"
+        progress(f"{of}: assemble stiffness and mass")
         try:
+            part = make()
+            own = replace(
+                request,
+                name=f"{request.name}_{k}",
+                reference=conditions_of_part(request.reference, part.coupled.names),
+                quality=None,
+                parts=None,
+            )
             yield _reduced(part, own, lambda stage, of=of: progress(f"{of}: {stage}"), advance)  # type: ignore[misc]
         except InputError as error:
             raise InputError(f"{of}: {error}") from None

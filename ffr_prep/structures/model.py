@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -114,7 +115,7 @@ def from_frame(frame: Frame, interfaces: Sequence[InterfaceRegion] = (), *, prog
         second=second,
         recovery="; ".join(dict.fromkeys(part.recovery for part in parts)),
         record=_record(frame, interfaces, coupled, parts),
-        cut=lambda cuts: [from_frame(*part) for part in cut_frame(frame, interfaces, cuts)],
+        cut=lambda cuts: [partial(from_frame, *part) for part in cut_frame(frame, interfaces, cuts)],
     )
 
 

@@ -13,7 +13,7 @@ from ffr_prep.cli import main
 from ffr_prep.common.errors import InputError
 from ffr_prep.mesh.mesh import Mesh
 from ffr_prep.model.coupled import InterfaceRegion
-from ffr_prep.model.cuts import CutPlane
+from ffr_prep.model.cuts import CutPlane, long_axis
 from ffr_prep.model.model import Model
 from ffr_prep.model.reference import FixedTo, MeanAxis, SimplySupported
 from ffr_prep.pipelines.reduce import Request, reduce
@@ -100,6 +100,22 @@ def test_stations_are_distances_from_the_end_along_the_long_axis():
     for k, station in ((0, 0.2), (1, 0.6)):
         at = body.parts[k].interface(f"cut_{k + 1}_a").position
         np.testing.assert_allclose(at, station * np.array([0.6, 0.8, 0.0]), atol=1e-12)
+
+
+def test_the_long_axis_is_not_that_of_the_finest_mesh():
+    """A hammer whose head has a hundred times as many nodes for its length as its shaft of one metre."""
+    shaft, head = np.linspace([0, 0, 0], [1, 0, 0], 11), np.linspace([1, -0.15, 0], [1, 0.15, 0], 1001)
+    np.testing.assert_array_equal(long_axis(np.concatenate([shaft, head])), [1, 0, 0])
+
+
+def test_cuts_that_cannot_be_made_are_refused_before_the_whole_is_reduced():
+    stages: list[str] = []
+    model = beam()
+    with pytest.raises(InputError, match="into two or more parts"):
+        reduce(
+            model, Request(name="bar", reference=MeanAxis(), reduction=CraigBampton(2), parts=1), progress=stages.append
+        )
+    assert not stages
 
 
 def test_planes_of_ones_own():
