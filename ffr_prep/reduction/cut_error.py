@@ -54,6 +54,17 @@ def cut_doubt(provenance: Mapping[str, Any]) -> str | None:
     )
 
 
+def cut_stress_doubt(body: FlexibleBody) -> str | None:
+    """The warning about stress beside cuts that hold a section rigid; None of a body of beams, or without stress."""
+    kinds = [part.interface(cut_names(k)[0]).kind for k, part in enumerate(body.parts[:-1], 1)]
+    if "rigid" not in kinds or body.surface is None or body.surface.stress is None:
+        return None
+    return (
+        "its stress within about a section's width of a cut is that of a section which is held rigid, up to a third off: cut "
+        "where no stress is asked for, or find it with the body in one piece"
+    )
+
+
 # ---- vibrations of parts that hang together -----------------------------------------------------------------------
 
 

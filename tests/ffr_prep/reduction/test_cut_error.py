@@ -5,17 +5,18 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from boxes import STEEL
+from boxes import STEEL, box_mesh
 
 from ffr_prep.body import truncated
 from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.cuts import CutPlane
-from ffr_prep.model.reference import MeanAxis
+from ffr_prep.model.reference import FixedTo, MeanAxis
 from ffr_prep.pipelines.reduce import Request, reduce
 from ffr_prep.reduction.cut_error import cut_errors_of, free_frequencies
 from ffr_prep.reduction.methods.craig_bampton import CraigBampton
 from ffr_prep.reduction.methods.eigenmodes import Eigenmodes
 from ffr_prep.report.text import body_lines
+from ffr_prep.solids.model import from_mesh
 from ffr_prep.structures.frame import Frame, Member, Shell, joined, named, panel, polyline
 from ffr_prep.structures.model import from_frame
 from ffr_prep.structures.sections import rectangle
@@ -24,9 +25,15 @@ BAR = Member(rectangle(0.02, 0.03), STEEL, (0.0, 0.0, 1.0))
 ACROSS = [CutPlane((0.95, 0.0, 0.0), (1.0, 0.0, 0.0))]
 
 
-def in_parts(frame: Frame, parts: object, reduction: object = CraigBampton(8)):
+def in_parts(frame: Frame, parts: object, reduction: object = CraigBampton(8), **settings: object):
     model = from_frame(frame, [InterfaceRegion(name) for name in frame.node_groups if name != "seam"])
-    return reduce(model, Request(name="frame", reference=MeanAxis(), reduction=reduction, parts=parts, linear=True))
+    given = {"reference": MeanAxis(), "reduction": reduction, "linear": True, **settings}
+    return reduce(model, Request(name="frame", parts=parts, **given))
+
+
+def von_mises(stress: np.ndarray) -> np.ndarray:
+    xx, yy, zz, xy, xz, yz = stress.T
+    return np.sqrt(0.5 * ((xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2) + 3 * (xy**2 + xz**2 + yz**2))
 
 
 def rails() -> Frame:
@@ -75,6 +82,22 @@ def test_a_sheet_whose_sections_may_not_warp_is_told():
 def test_parts_whose_shapes_know_no_loads_at_their_cuts_are_told():
     [warning] = in_parts(rod(), 4, Eigenmodes(8)).provenance["warnings"]
     assert "take craig-bampton, whose shapes let cuts move" in warning
+
+
+def test_stress_beside_a_cut_is_told_of_solids_alone():
+    """A bar under one pascal of tension has a von Mises stress of one everywhere, but beside its cut."""
+    mesh = box_mesh("hex20", (1.0, 0.06, 0.04), (12, 2, 1))
+    model = from_mesh(mesh, STEEL, [InterfaceRegion("left"), InterfaceRegion("right")])
+    request = Request(name="bar", reference=FixedTo("left"), reduction=CraigBampton(0), stress=True, linear=True)
+    body = reduce(model, replace(request, parts=2))
+    assert "up to a third off" in body.provenance["warnings"][-1]
+    first = body.parts[0]
+    tension = first.surface.stress @ (first.interface("cut_1_a").phi_t[0] * 0.0024 / first.omega2)
+    cut = np.isclose(first.surface.points[:, 0], 0.5)
+    assert 0.67 < von_mises(tension[cut]).min() < 0.8
+    middle = np.isclose(first.surface.points[:, 0], 0.25)
+    np.testing.assert_allclose(von_mises(tension[middle]), 1.0, atol=0.02)
+    assert not any("cut" in warning for warning in in_parts(rod(), 2, stress=True).provenance["warnings"])
 
 
 def test_bodies_of_hardly_any_shapes():
