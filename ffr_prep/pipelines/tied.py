@@ -96,12 +96,13 @@ def tied(parts: Mapping[str, Model], ties: Sequence[tuple[str, str]]) -> Model:
         recovery="; ".join(dict.fromkeys(m.recovery for m in models)),
         record={
             "parts": {
-                name: {k: v for k, v in part.record.items() if k not in ("warnings", WITHOUT_SHEAR)}
+                name: {k: v for k, v in part.record.items() if k not in ("notes", "warnings", WITHOUT_SHEAR)}
                 for name, part in parts.items()
             },
             "ties": [list(pair) for pair in ties],
             WITHOUT_SHEAR: [name for part in parts.values() for name in part.record.get(WITHOUT_SHEAR, [])],
-            "warnings": _warnings(parts, ties),
+            "notes": _of_parts("notes", parts),
+            "warnings": [*_of_parts("warnings", parts), *_long_arms(parts, ties)],
         },
         doubts=lambda basis: _doubts(parts, [x @ basis for x in own]),
         mesh_energy=lambda basis: _known_sum([m.mesh_energy(x @ basis) for m, x in zip(models, own, strict=True)]),
@@ -114,9 +115,9 @@ def _doubts(parts: Mapping[str, Model], bases: Sequence[Array]) -> list[str]:
     return [f"{name}: {d}" for (name, m), basis in zip(parts.items(), bases, strict=True) for d in m.doubts(basis)]
 
 
-def _warnings(parts: Mapping[str, Model], ties: Sequence[tuple[str, str]]) -> list[str]:
-    of_parts = (f"{name}: {w}" for name, part in parts.items() for w in part.record.get("warnings", []))
-    return [*of_parts, *_long_arms(parts, ties)]
+def _of_parts(key: str, parts: Mapping[str, Model]) -> list[str]:
+    """The notes or warnings of the parts, with their names."""
+    return [f"{name}: {said}" for name, part in parts.items() for said in part.record.get(key, [])]
 
 
 def _long_arms(parts: Mapping[str, Model], ties: Sequence[tuple[str, str]]) -> list[str]:

@@ -86,6 +86,7 @@ def from_mesh(
             },
             "material": described(material),
             "interfaces": [_described(plain, interface) for interface in interfaces],
+            "notes": list(mesh.notes),
             "warnings": [*mesh_warnings(mesh), *doubts_of_materials(material)],
         },
         mesh_energy=lambda basis: added_energy(mesh, material, [i.region or i.name for i in interfaces], field(basis)),
