@@ -165,8 +165,8 @@ def _parts(
                 parts=None,
             )
             yield _reduced(part, own, lambda stage, of=of: progress(f"{of}: {stage}"), advance)  # type: ignore[misc]
-        except InputError as error:
-            raise InputError(f"{of}: {error}") from None
+        except (InputError, ComputationError) as error:
+            raise type(error)(f"{of}: {error}") from None
 
 
 def _with_cut_error(body: FlexibleBody) -> FlexibleBody:

@@ -10,7 +10,7 @@ from boxes import STEEL, box_mesh
 
 from ffr_prep.body import BodyError, FlexibleBody, load_body, save_body, truncated, with_point
 from ffr_prep.cli import main
-from ffr_prep.common.errors import InputError
+from ffr_prep.common.errors import ComputationError, InputError
 from ffr_prep.mesh.mesh import Mesh
 from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.cuts import CutPlane, long_axis
@@ -20,6 +20,8 @@ from ffr_prep.pipelines.reduce import Request, reduce
 from ffr_prep.pipelines.structure_file import read_structure
 from ffr_prep.reduction.conversion import with_reference
 from ffr_prep.reduction.methods.craig_bampton import CraigBampton
+from ffr_prep.reduction.methods.rubin import Rubin
+from ffr_prep.reduction.selection import Accuracy, Band
 from ffr_prep.report.text import body_lines
 from ffr_prep.solids.model import from_mesh
 from ffr_prep.structures.frame import Member, Shell, named, panel, polyline
@@ -221,6 +223,14 @@ def test_parts_that_do_not_make_up_the_body():
 def test_a_short_part_is_named_where_its_modes_do_not_suffice():
     with pytest.raises(InputError, match="part 1 of 8: asked for 12 normal modes"):
         cut(beam(), 8, reduction=CraigBampton(12))
+
+
+def test_a_short_part_whose_receptances_need_more_than_its_slow_modes_is_named_with_the_way_out():
+    """Along its axis a part is so stiff that no mode near the band has its flexibility; Rubin's static shapes do."""
+    slow = Accuracy(Band(1.0, 200.0), 0.01)
+    with pytest.raises(ComputationError, match=r"part 1 of 4: with all .* use rubin"):
+        cut(beam(), 4, reduction=CraigBampton(slow))
+    assert len(cut(beam(), 4, reduction=Rubin(slow)).parts) == 4
 
 
 STRUCTURE = """
