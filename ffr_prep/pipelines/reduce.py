@@ -15,6 +15,9 @@ from ffr_prep.body import (
     Damping,
     FlexibleBody,
     Interface,
+    cut_doubt,
+    cut_error,
+    cut_stress_doubt,
     mesh_doubt,
     shear_doubt,
     steady_stress_doubt,
@@ -31,7 +34,6 @@ from ffr_prep.model.model import Model
 from ffr_prep.model.reactions import in_equilibrium, known_loads
 from ffr_prep.model.reference import ReferenceConditions, at_interfaces, conditions_of_part, functionals
 from ffr_prep.reduction.basis import Basis, Reduction, check_basis, factorised
-from ffr_prep.reduction.cut_error import cut_doubt, cut_error, cut_stress_doubt
 from ffr_prep.reduction.held_body import held_body, needs_held_body
 from ffr_prep.reduction.mesh_error import mesh_error
 from ffr_prep.reduction.quality import assess, completed

@@ -8,11 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ffr_prep.body import MESH_ERROR, STEADY_STRESS, FlexibleBody, mesh_errors_of
+from ffr_prep.body import CUT_ERROR, MESH_ERROR, STEADY_STRESS, FlexibleBody, cut_errors_of, mesh_errors_of
 from ffr_prep.body.interface_freedom import interface_freedom
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.in_words import settings_in_words, vector_in_words
-from ffr_prep.reduction.cut_error import CUT_ERROR, cut_errors_of
 from ffr_prep.reduction.quality import Quality, quality_of
 from ffr_prep.report.integrals import integral_lines
 
