@@ -32,12 +32,12 @@ class Vibrations:
 def free_vibrations(bodies: Sequence[FlexibleBody], count: int) -> Vibrations:
     """The slowest vibrations of the parts of a body, or of one body, that nothing holds.
 
-    Found by subspace iteration: of as many vectors again as are wanted, so that a few iterations do (Bathe, Finite Element
-    Procedures, section 11.6).
+    Found by subspace iteration, of twice as many vectors as are wanted and more, so that a few iterations do (Bathe, Finite
+    Element Procedures, section 11.6).
     """
     rates = np.sqrt(np.concatenate([body.omega2 for body in bodies]))[:, None]
     chain = _chain(bodies)
-    size = min(2 * count, len(rates))
+    size = min(2 * count + 4, len(rates))
     space = np.random.default_rng(0).standard_normal((len(rates), size)) if size < len(rates) else np.eye(size)
     squares, found = np.zeros(size), space
     for _ in range(_MOST):

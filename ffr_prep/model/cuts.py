@@ -184,7 +184,10 @@ def _with_strays_moved(part: Array, count: int, bonds: Array) -> Array:
         found = np.unique(pieces[part == k]).size
         if found != 1:
             state = f"falls into {found} pieces" if found else "has no elements"
-            raise InputError(f"part {k + 1} of {count} {state}: cut elsewhere, or into fewer parts")
+            raise InputError(
+                f"part {k + 1} of {count} {state}: cut elsewhere, by stations or planes (fp.CutPlane; in a structure file "
+                "point and normal), or into fewer parts"
+            )
     return part
 
 
