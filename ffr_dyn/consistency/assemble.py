@@ -31,7 +31,7 @@ from ffr_dyn.equations.layout import Layout, initial_state
 from ffr_dyn.functions.overshoots import overshoots
 from ffr_dyn.scene.followed import TURN
 from ffr_dyn.scene.force_kinds import forces_of
-from ffr_dyn.scene.parts import wholes
+from ffr_dyn.scene.parts import owner, wholes
 from ffr_dyn.scene.scene import Body, Scene, altered, length_of, measured_body, require_scene
 from ffr_dyn.scene.sensors import Measurement
 from ffr_dyn.variants.aligned import levelled
@@ -39,6 +39,7 @@ from ffr_dyn.variants.mean_axis import in_mean_axis_frames
 from ffr_dyn.variants.plane import AXES, obstacles, planar_forms
 from ffr_prep.body import (
     cut_doubt,
+    cut_stress_doubt,
     damping_ratio,
     free_vibrations,
     mesh_doubt,
@@ -146,8 +147,9 @@ def body_doubts(scene: Scene) -> list[str]:
         doubts += [(name, doubt) for doubt in told]
     stressed = [scene.bodies[b] for b in sorted(measured)]
     doubts += [(b.name, of(b.model.provenance)) for b in stressed for of in (steady_stress_doubt, shear_doubt)]
+    doubts += [(owner(b), cut_stress_doubt(b.part_of.model)) for b in stressed if b.part_of]
     doubts += [(body.name, doubt) for body in scene.bodies for doubt in units_doubts(body.model)]
-    return [f"body {name!r}: {doubt}" for name, doubt in doubts if doubt] + _gravity_doubts(scene)
+    return [f"body {name!r}: {doubt}" for name, doubt in dict.fromkeys(doubts) if doubt] + _gravity_doubts(scene)
 
 
 def _damped_otherwise(whole: Body, parts: Sequence[Body]) -> str | None:

@@ -357,3 +357,11 @@ def test_damping_that_parts_do_not_keep_is_told_with_its_ratios(stiffening):
     ):
         assert not any("its parts damp" in note for note in assemble(Scene((kept,))).notes)
     assert any("its parts damp" in note for note in assemble(Scene((Body("beam", damped(model, alpha=2.0)),))).notes)
+
+
+def test_stress_beside_a_cut_is_told_by_runs_that_measure_it_and_kept_for_reports():
+    measured = (StressMeasurement("a", "beam", (0.1, 0, 0.02)), StressMeasurement("b", "beam", (0.6, 0, 0.02)))
+    result = static(pushed(bar(4), measurements=measured))
+    told = "its stress within about a section's width of a cut is that of a section which is held rigid"
+    assert len([note for note in result.attributes["notes"] if told in note]) == 1
+    assert told in result.attributes["stress_lacks"]["beam_1"]
