@@ -155,7 +155,7 @@ def body_doubts(scene: Scene) -> list[str]:
 def _damped_otherwise(whole: Body, parts: Sequence[Body]) -> str | None:
     """A note on parts that damp the slowest vibration of the free body by another ratio than the whole has."""
     matrices = [damping_matrix(part.model, part.damping) for part in parts]
-    if not any(matrix.any() for matrix in matrices):
+    if not whole.model.n or not any(matrix.any() for matrix in matrices):
         return None
     found, all_of = free_vibrations([part.model for part in parts], 1), free_vibrations([whole.model], _AMONG)
     k = int(np.argmin(np.abs(all_of.omega - found.omega[0])))  # in a plane it is not always the first
