@@ -177,7 +177,8 @@ def inertia(part: Family, nodal: Array) -> InertiaIntegrals:
 def _inertia(part: Family, nodal: Array, own: slice) -> InertiaIntegrals:
     Phi = part.field[own] @ nodal[own, None]
     mass = sp.diags_array(part.mass[own].ravel())
-    return inertia_integrals(part.positions[own].reshape(-1, 3), mass, Phi.reshape(-1, 3, nodal.shape[2]))
+    positions = part.positions[own].reshape(-1, 3)
+    return inertia_integrals(positions, mass, Phi.reshape(len(positions), 3, nodal.shape[2]))
 
 
 # ---- what is known about the body ---------------------------------------------------------------------------------

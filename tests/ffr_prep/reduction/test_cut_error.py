@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from boxes import STEEL, box_mesh
 
 from ffr_prep.body import cut_errors_of, free_vibrations, truncated
@@ -14,6 +15,7 @@ from ffr_prep.model.reference import FixedTo, MeanAxis
 from ffr_prep.pipelines.reduce import Request, reduce
 from ffr_prep.reduction.methods.craig_bampton import CraigBampton
 from ffr_prep.reduction.methods.eigenmodes import Eigenmodes
+from ffr_prep.reduction.selection import UpTo
 from ffr_prep.report.text import body_lines
 from ffr_prep.solids.model import from_mesh
 from ffr_prep.structures.frame import Frame, Member, Shell, joined, named, panel, polyline
@@ -104,3 +106,11 @@ def test_bodies_of_hardly_any_shapes():
     body = in_parts(rod(), ACROSS, Eigenmodes(1))
     assert len(body.provenance["cut_error"]["parts"]) == 1
     assert not free_vibrations([truncated(body, 0)], 6).omega.size
+
+
+def test_a_frame_that_no_mode_is_slow_enough_for_is_a_rigid_body():
+    sheet = panel([(2, 0, 0), (2.2, 0, 0), (2.2, 0.1, 0), (2, 0.1, 0)], Shell(0.003, STEEL), elements=(2, 2))
+    frame = named(joined(polyline([(0, 0, 0), (2, 0, 0)], BAR, elements=8), sheet), left=(0, 0, 0))
+    body = in_parts(frame, 2, Eigenmodes(UpTo(0.1)), stress=True)
+    assert (body.n, body.parts[0].n, body.parts[1].n) == (0, 0, 0)
+    assert body.mass == pytest.approx(STEEL.rho * (2 * 0.02 * 0.03 + 0.2 * 0.1 * 0.003))
