@@ -6,6 +6,7 @@ alone wherever rigid motion suffices. (Haug 1989, ch. 4.)
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -25,20 +26,33 @@ from ffr_dyn.consistency.held_frequencies import held_frequencies
 from ffr_dyn.consistency.sliding import sliding_notes
 from ffr_dyn.consistency.validity import deflections
 from ffr_dyn.equations.constraint_rows import Block, blocks_of
+from ffr_dyn.equations.inertia import damping_matrix
 from ffr_dyn.equations.layout import Layout, initial_state
 from ffr_dyn.functions.overshoots import overshoots
 from ffr_dyn.scene.followed import TURN
 from ffr_dyn.scene.force_kinds import forces_of
-from ffr_dyn.scene.scene import Scene, altered, length_of, measured_body, require_scene
+from ffr_dyn.scene.parts import owner, wholes
+from ffr_dyn.scene.scene import Body, Scene, altered, length_of, measured_body, require_scene
 from ffr_dyn.scene.sensors import Measurement
 from ffr_dyn.variants.aligned import levelled
 from ffr_dyn.variants.mean_axis import in_mean_axis_frames
 from ffr_dyn.variants.plane import AXES, obstacles, planar_forms
-from ffr_prep.body import mesh_doubt, shear_doubt, steady_stress_doubt, units_doubts
+from ffr_prep.body import (
+    cut_doubt,
+    cut_stress_doubt,
+    damping_ratio,
+    free_vibrations,
+    mesh_doubt,
+    shear_doubt,
+    steady_stress_doubt,
+    units_doubts,
+)
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.brief import Brief
 from ffr_prep.common.errors import InputError
 
+_AMONG = 6  # free vibrations of a whole, of which one is the slowest of its parts
+_SAME_DAMPING = 0.2  # of a ratio
 _MOST_GRAVITY = 1000.0  # m/s^2; in mm/s^2 that of the Earth is 9810
 SHIFTED = 1e-6  # m, rad, from where it is told that assembly moved a body
 SLOWED = 1e-2  # of a velocity that a scene gives, from where it is told that a body has another
@@ -123,14 +137,37 @@ def assemble(scene: Scene, *, time: float = 0.0) -> Assembled:
 
 
 def body_doubts(scene: Scene) -> list[str]:
-    """Notes on bodies: a mesh too coarse, a measured stress or section force that lacks that of inertia, numbers that cannot
-    be meant."""
+    """Notes on bodies: a mesh too coarse, parts that are stiffer than the whole or damp otherwise, a measured stress or
+    section force that lacks that of inertia, numbers that cannot be meant."""
     measured = {measured_body(scene, of) for of in scene.measurements if not isinstance(of, Measurement)}
-    doubts = [(body.name, mesh_doubt(body.model.provenance)) for body in scene.bodies]
+    doubts = [(body.name, mesh_doubt(body.model.provenance)) for body in scene.bodies if body.part_of is None]
+    for name, parts in wholes(scene.bodies).items():
+        whole = parts[0].part_of
+        told = (mesh_doubt(whole.model.provenance), cut_doubt(whole.model.provenance), _damped_otherwise(whole, parts))
+        doubts += [(name, doubt) for doubt in told]
     stressed = [scene.bodies[b] for b in sorted(measured)]
     doubts += [(b.name, of(b.model.provenance)) for b in stressed for of in (steady_stress_doubt, shear_doubt)]
+    doubts += [(owner(b), cut_stress_doubt(b.part_of.model)) for b in stressed if b.part_of]
     doubts += [(body.name, doubt) for body in scene.bodies for doubt in units_doubts(body.model)]
-    return [f"body {name!r}: {doubt}" for name, doubt in doubts if doubt] + _gravity_doubts(scene)
+    return [f"body {name!r}: {doubt}" for name, doubt in dict.fromkeys(doubts) if doubt] + _gravity_doubts(scene)
+
+
+def _damped_otherwise(whole: Body, parts: Sequence[Body]) -> str | None:
+    """A note on parts that damp the slowest vibration of the free body by another ratio than the whole has."""
+    matrices = [damping_matrix(part.model, part.damping) for part in parts]
+    if not whole.model.n or not any(matrix.any() for matrix in matrices):
+        return None
+    found, all_of = free_vibrations([part.model for part in parts], 1), free_vibrations([whole.model], _AMONG)
+    k = int(np.argmin(np.abs(all_of.omega - found.omega[0])))  # in a plane it is not always the first
+    own = np.zeros((whole.model.n,) * 2) if whole.model.damping is None else whole.model.damping
+    in_parts, in_one = damping_ratio(found, 0, matrices), damping_ratio(all_of, k, [own]) + whole.damping[0]
+    if abs(in_parts - in_one) <= _SAME_DAMPING * in_one:
+        return None
+    return (
+        f"its parts damp a free vibration of {found.omega[0] / TURN:.4g} Hz by a ratio of {in_parts:.2g}, and one piece by "
+        f"{in_one:.2g}: ratios and loss factors belong to the modes of each part, and alpha M damps no motion of frames; "
+        "give what grows with stiffness, which parts keep (rayleigh = [0, BETA])"
+    )
 
 
 def _gravity_doubts(scene: Scene) -> list[str]:

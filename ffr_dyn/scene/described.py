@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from ffr_dyn.functions.time_functions import is_zero
@@ -14,8 +14,8 @@ from ffr_dyn.scene.forces.given import is_number
 from ffr_dyn.scene.forces.places import effort
 from ffr_dyn.scene.joints import Joint, frames
 from ffr_dyn.scene.parts import wholes
-from ffr_dyn.scene.scene import Scene
-from ffr_prep.body import left_out_stress, shear_doubt
+from ffr_dyn.scene.scene import Body, Scene
+from ffr_prep.body import cut_stress_doubt, left_out_stress, shear_doubt
 
 # Joints of these kinds have no axis to speak of.
 _WITHOUT_AXIS = ("spherical", "fixed", "distance", "orientation")
@@ -32,12 +32,19 @@ def described(scene: Scene) -> dict[str, Any]:
     ground = {name: at.tolist() for name, at in scene.ground.items()}
     sizes = {"mass": sum(body.model.mass for body in scene.bodies), "length": _length(scene)}
     stress = {body.name: of for body in scene.bodies if (of := left_out_stress(body.model.provenance))}
-    lacks = {body.name: said for body in scene.bodies if (said := shear_doubt(body.model.provenance))}
+    lacks = {body.name: "; ".join(said) for body in scene.bodies if (said := [*_lacks(body)])}
     found: dict[str, Any] = {**sizes, "parts": parts, "ground": ground, "connections": _connections(scene)}
     found |= {"stress_lacks": lacks, "gravity": scene.gravity.tolist() if scene.gravity.any() else []}
     if stress and all(is_zero(f) for f in scene.base_acceleration):  # which a result does not keep
         found |= {"left_out_stress": stress}
     return {"title": scene.name} | {key: value for key, value in found.items() if value}
+
+
+def _lacks(body: Body) -> Iterator[str]:
+    if said := shear_doubt(body.model.provenance):
+        yield said
+    if body.part_of and (said := cut_stress_doubt(body.part_of.model)):
+        yield said
 
 
 def _length(scene: Scene) -> float:

@@ -11,7 +11,9 @@ The numbered invariants I1...I9 and Shabana's S_bar family are read-only views o
 """
 
 from ffr_prep.body.accelerations import PRODUCTS
+from ffr_prep.body.chain import damping_ratio, free_vibrations
 from ffr_prep.body.constructors import check_point, recombined, rigid_body, with_point
+from ffr_prep.body.cut_error import CUT_ERROR, cut_doubt, cut_error, cut_errors_of, cut_stress_doubt
 from ffr_prep.body.damping import Damping, damped, with_damping
 from ffr_prep.body.fewer_modes import truncated
 from ffr_prep.body.file import content_hash, load_body, save_arrays, save_body, surface_arrays, surface_of
@@ -57,6 +59,7 @@ from ffr_prep.body.steady_stress import (
 from ffr_prep.body.units_doubt import units_doubts
 
 __all__ = [
+    "CUT_ERROR",
     "MESH_ERROR",
     "PRODUCTS",
     "SECTION_FORCES",
@@ -78,9 +81,15 @@ __all__ = [
     "compressed",
     "compressed_beside",
     "content_hash",
+    "cut_doubt",
+    "cut_error",
+    "cut_errors_of",
     "cut_names",
+    "cut_stress_doubt",
     "damped",
+    "damping_ratio",
     "displacements",
+    "free_vibrations",
     "idle_loads",
     "immovable",
     "interface_motions",

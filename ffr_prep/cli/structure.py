@@ -83,6 +83,7 @@ def reduce_structure_command(structure: Path, output: Path, entries: tuple[str, 
     loaded = read_structure(structure, steps, entries=given)
     steps.end()
     show(frame_lines(loaded.frame))
+    show(f"note        {name}: {note}" for name, (mesh, *_) in loaded.solids.items() for note in mesh.notes)
     cuts = loaded.request.parts if options["parts"] is None else options["parts"]
     request = replace(loaded.request, parts=cuts, solver=solver, provenance={"source": {"file": structure.name}})
     reduce_to_file(lambda: loaded.model(steps), request, output, steps)

@@ -25,7 +25,7 @@ ENDINGS = {
     ".nc": "a result file, which `ffr-dyn info`, `plot` and `animate` show",
     ".toml": "a text such as a scene, which `ffr-dyn run` analyses",
     **dict.fromkeys((".step", ".stp", ".iges", ".igs", ".brep", ".geo"), _CAD),
-    **dict.fromkeys((".inp", ".bdf", ".nas", ".msh", ".med", ".unv", ".vtu", ".frd"), _MESH),
+    **dict.fromkeys((".inp", ".bdf", ".nas", ".dat", ".msh", ".med", ".unv", ".vtu", ".frd"), _MESH),
 }
 _MARKS = (BOM_UTF16_LE, BOM_UTF16_BE)
 TOO_MANY_DIGITS = "int_max_str_digits"  # in a ValueError of Python for thousands of them

@@ -46,11 +46,16 @@ class _Deck:
     faces: dict[int, list[int]] = field(default_factory=dict)
     node_sets: dict[str, list[str]] = field(default_factory=dict)
     element_sets: dict[str, list[str]] = field(default_factory=dict)
+    nodes_of: dict[str, list[str]] = field(
+        default_factory=dict
+    )  # of a node set the sets of elements whose nodes it has
     surfaces: dict[str, list[tuple[str, str]]] = field(default_factory=dict)
     spelling: dict[str, str] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
     found: Counter[str] = field(default_factory=Counter)
     instances: int = 0
+    in_assembly: bool = False  # beside its instances, where numbers count anew
+    reference_points: int = 0
 
 
 def from_abaqus(path: Path) -> FileMesh:
@@ -131,6 +136,9 @@ def _row(line: str) -> Row:
 
 
 def _read_nodes(deck: _Deck, parameters: Mapping[str, str], rows: list[Row]) -> None:
+    if deck.in_assembly:
+        deck.reference_points += len(rows)
+        return
     if parameters.get("SYSTEM", "R").upper() != "R":
         raise InputError(f"nodes are given in cylindrical or spherical coordinates (SYSTEM): {_LISTED}")
     for number, *coordinates in rows:
@@ -165,11 +173,20 @@ def _read_elements(deck: _Deck, parameters: Mapping[str, str], rows: list[Row]) 
 
 
 def _read_node_set(deck: _Deck, parameters: Mapping[str, str], rows: list[Row]) -> None:
-    _extend(deck, deck.node_sets, parameters["NSET"], _members(parameters, rows))
+    _extend(deck, deck.node_sets, parameters["NSET"], _of_parts(deck, parameters, rows))
+    if "ELSET" in parameters:
+        deck.nodes_of.setdefault(parameters["NSET"].upper(), []).append(parameters["ELSET"])
 
 
 def _read_element_set(deck: _Deck, parameters: Mapping[str, str], rows: list[Row]) -> None:
-    _extend(deck, deck.element_sets, parameters["ELSET"], _members(parameters, rows))
+    _extend(deck, deck.element_sets, parameters["ELSET"], _of_parts(deck, parameters, rows))
+
+
+def _of_parts(deck: _Deck, parameters: Mapping[str, str], rows: list[Row]) -> list[str]:
+    """The members of a set, without the numbers of what the assembly itself defines: reference points, springs."""
+    members = _members(parameters, rows)
+    own = deck.in_assembly and "INSTANCE" not in parameters
+    return [member for member in members if not (own and member.isdecimal())]
 
 
 def _read_surface(deck: _Deck, parameters: Mapping[str, str], rows: list[Row]) -> None:
@@ -178,7 +195,7 @@ def _read_surface(deck: _Deck, parameters: Mapping[str, str], rows: list[Row]) -
         _extend(deck, deck.node_sets, name, [row[0] for row in rows])
         return
     sides = [(row[0], row[1].upper() if len(row) > 1 else "") for row in rows]
-    if not all(re.fullmatch(r"S[1-6]|SPOS|SNEG", side) for _, side in sides):
+    if not all(member and re.fullmatch(r"S[1-6]|SPOS|SNEG", side) for member, side in sides):
         deck.notes.append(f"surface {name!r} is left out: it is not a list of elements and faces S1 to S6")
         return
     deck.spelling.setdefault(name.upper(), name)
@@ -187,8 +204,17 @@ def _read_surface(deck: _Deck, parameters: Mapping[str, str], rows: list[Row]) -
 
 def _read_instance(deck: _Deck, parameters: Mapping[str, str], rows: list[Row]) -> None:
     deck.instances += 1
+    deck.in_assembly = False
     if deck.instances > 1 or rows:
         raise InputError("it places parts in an assembly; write the one part to reduce to a file of its own")
+
+
+def _enter_assembly(deck: _Deck, parameters: Mapping[str, str], rows: list[Row]) -> None:
+    deck.in_assembly = True
+
+
+def _leave_assembly(deck: _Deck, parameters: Mapping[str, str], rows: list[Row]) -> None:
+    deck.in_assembly = False
 
 
 def _read_transform(deck: _Deck, parameters: Mapping[str, str], rows: list[Row]) -> None:
@@ -205,6 +231,9 @@ _READERS: Mapping[str, Callable[[_Deck, Mapping[str, str], list[Row]], None]] = 
     "ELSET": _read_element_set,
     "SURFACE": _read_surface,
     "INSTANCE": _read_instance,
+    "ASSEMBLY": _enter_assembly,
+    "END INSTANCE": _enter_assembly,
+    "END ASSEMBLY": _leave_assembly,
 }
 
 
@@ -234,15 +263,30 @@ def _file_mesh(deck: _Deck) -> FileMesh:
     planes = {name: [deck.faces[n] for n in members if n in deck.faces] for name, members in found.items()}
     sides = {name: _sides(deck, rows) for name, rows in deck.surfaces.items()}
     corners = {name: [face[: _CORNERS[len(face)]] for face in faces] for name, faces in (planes | sides).items()}
-    nodes = {name: _resolved(name, deck.node_sets) for name in deck.node_sets}
+    nodes = {name: _resolved(name, deck.node_sets) + _nodes_of(deck, name) for name in deck.node_sets}
     return FileMesh(
         points=np.array(list(deck.nodes.values()), float).reshape(-1, 3),
         blocks=tuple((kind, _indices(index, list(elements.values()))) for kind, elements in solids.items()),
         volumes={deck.spelling[name]: np.unique(of) for name, of in volumes.items() if of},
         faces={deck.spelling[name]: _by_size(index, of) for name, of in corners.items() if of},
         nodes={deck.spelling[name]: np.unique(_indices(index, [of])) for name, of in nodes.items() if of},
-        notes=(*deck.notes, *left_out_of_abaqus(deck.found)),
+        notes=(*deck.notes, *_points_left_out(deck), *left_out_of_abaqus(deck.found)),
     )
+
+
+def _points_left_out(deck: _Deck) -> list[str]:
+    return [
+        f"{deck.reference_points} nodes of the assembly left out: reference points are those of interfaces, --interface "
+        "NAME=REGION@x,y,z"
+        for _ in range(deck.reference_points > 0)
+    ]
+
+
+def _nodes_of(deck: _Deck, name: str) -> list[int]:
+    """Numbers of the nodes of the element sets that a node set names."""
+    elements = deck.faces | {number: nodes for of in deck.solids.values() for number, nodes in of.items()}
+    numbers = _resolved("", {"": deck.nodes_of.get(name, []), **deck.element_sets})
+    return [node for number in numbers for node in elements.get(number, [])]
 
 
 def _indices(index: Mapping[int, int], numbers: list[list[int]]) -> Array:

@@ -52,9 +52,9 @@ MESH_FORMATS: Registry[MeshFormat] = Registry(
         ),
         MeshFormat(
             "Nastran",
-            ".bdf, .nas, .fem: bulk data in small, large or free fields",
+            ".bdf, .nas, .fem, .dat: bulk data in small, large or free fields",
             "ffr_prep.mesh.nastran:from_nastran",
-            (".bdf", ".nas", ".fem"),
+            (".bdf", ".nas", ".fem", ".dat"),
         ),
         MeshFormat(
             "CalculiX results",

@@ -41,6 +41,11 @@ _DAMPING = ("damping", "give it by --rayleigh, --loss-factor or --damping")
 _TABLES = ("tables over temperature", "the constants are those of the card that they belong to")
 _NOT_LINEAR = ("yield and creep", "bodies are linearly elastic")
 _FLUID = ("acoustic elements", "a body is solid; what the fluid weighs is a mass of the scene, what it presses a load")
+_REMOVED = (
+    "elements that a step takes out or puts in",
+    "a body has all its elements: delete those that it should not have",
+)
+_INITIAL = ("initial conditions", "a body begins without stress, and velocities belong to a scene")
 _MATRICES = ("matrices", "take K and M of the whole model: ffr-prep reduce-matrices")
 
 # Keywords with their star, types of elements without.
@@ -61,6 +66,8 @@ _ABAQUS = (
     ),
     _Kind(r"\*BOUNDARY|\*BOUNDARYF", *_SUPPORTS),
     _Kind(r"\*(CLOAD|DLOAD|DSLOAD|TEMPERATURE|BASE MOTION|CFLUX|DFLUX|CENTRIF)", *_LOADS),
+    _Kind(r"\*MODEL CHANGE", *_REMOVED),
+    _Kind(r"\*INITIAL CONDITIONS", *_INITIAL),
     _Kind(r"\*(DAMPING|GLOBAL DAMPING|MODAL DAMPING|DASHPOT DAMPING)", *_DAMPING),
     _Kind(r"U\d+|\*(USER ELEMENT|SUBSTRUCTURE PROPERTY|MATRIX ASSEMBLE|MATRIX INPUT)", *_MATRICES),
 )
@@ -74,6 +81,7 @@ _NASTRAN = (
     _Kind(r"SPC1?|SPCD", *_SUPPORTS),
     _Kind(r"FORCE[12]?|MOMENT[12]?|PLOAD[1245]?|GRAV|RFORCE|TEMPD?|SLOAD|ACCEL1?", *_LOADS),
     _Kind(r"GE", *_DAMPING),
+    _Kind(r"PFLUID|FFLUID|CHACAB|CAABSF|CHACBR", *_FLUID),
     _Kind(r"MATT\d+", *_TABLES),
     _Kind(r"MATS1|MATEP|MATTEP|MATVP|CREEP|MATHE|MATVE", *_NOT_LINEAR),
     _Kind(r"GENEL|DMIG|DMIAX", *_MATRICES),

@@ -350,6 +350,7 @@ def check_mesh(mesh: Mesh) -> None:
     _check_numbers(mesh)
     _check_groups(mesh)
     _check_repeated(mesh)
+    _check_collapsed(mesh)
     _check_jacobians(mesh)
     _check_glued(mesh)
     _check_coincident(mesh)
@@ -393,6 +394,21 @@ def _check_repeated(mesh: Mesh) -> None:
                 f"({kind}) at {_at(_centres(mesh)[element])}: remove the copies"
             )
         first += len(nodes)
+
+
+def _check_collapsed(mesh: Mesh) -> None:
+    """InputError for elements that name a node twice, as wedges and pyramids do that are written as hexahedra."""
+    first, found = 0, list[int]()
+    for _, nodes in _pairs(mesh):
+        ordered = np.sort(nodes, axis=1)
+        found += (first + np.flatnonzero((ordered[:, 1:] == ordered[:, :-1]).any(axis=1))).tolist()
+        first += len(nodes)
+    if found:
+        raise InputError(
+            f"{len(found)} elements name a node twice, the first being element {found[0]} at "
+            f"{_at(_centres(mesh)[found[0]])}: wedges and pyramids written as collapsed hexahedra cannot be used; mesh with "
+            "tetrahedra, or with hexahedra alone"
+        )
 
 
 def _check_jacobians(mesh: Mesh) -> None:

@@ -5,6 +5,7 @@ Source: MSC Nastran Quick Reference Guide (bulk data entries; order of the nodes
 
 from __future__ import annotations
 
+import re
 from collections import Counter, defaultdict
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -14,17 +15,20 @@ import numpy as np
 
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
-from ffr_prep.common.reading import check_count
+from ffr_prep.common.reading import check_count, read_text
 from ffr_prep.mesh.bulk_data import Card, cards
 from ffr_prep.mesh.file_mesh import FileMesh, supported_kind
 from ffr_prep.mesh.left_out import left_out_of_nastran
+from ffr_prep.mesh.meshio_files import from_meshio
 
 # Nodes of elements and their corners; Nastran has the edges between both faces of a CHEXA before those of the second one.
 _SOLIDS = {"CTETRA": (4, {4: "tet4", 10: "tet10"}), "CHEXA": (8, {8: "hex8", 20: "hex20"})}
 _HEX20 = [*range(12), *range(16, 20), *range(12, 16)]
 _OTHER_SOLIDS = ("CPENTA", "CPYRAM", "CPYRA")
 _FACES = {"CTRIA3": 3, "CTRIA6": 3, "CTRIAR": 3, "CQUAD4": 4, "CQUAD8": 4, "CQUADR": 4, "CQUAD": 4}
+_FLUIDS = ("PFLUID", "FFLUID")
 _SYSTEMS = ("CORD2R", "CORD2C", "CORD2S")
+_TECPLOT = re.compile(r"^\s*(VARIABLES|ZONE)\b", re.MULTILINE | re.IGNORECASE)
 _DEEPEST = 40
 
 
@@ -44,18 +48,29 @@ class _Deck:
 
 def from_nastran(path: Path) -> FileMesh:
     """The mesh of Nastran bulk data. Properties are groups property_N of elements and of faces, SET1 groups set_N of nodes.
+    A .dat file may be one of Tecplot, too, which meshio reads.
 
     Raises InputError for a file that cannot be read, for other solids, and for points in systems that it does not define.
     """
+    if path.suffix.lower() == ".dat" and _TECPLOT.search(read_text(path, "Nastran bulk data")):
+        return from_meshio(path)
     deck = _Deck()
     try:
         for card in cards(path):
             _take(deck, card)
-            deck.found["GE" if card.name == "MAT1" and card.text(8) else card.name] += 1
+            deck.found[_kind(card)] += 1
         return _file_mesh(deck)
     except InputError as error:
         text = str(error)
         raise InputError(text if text.startswith(str(path)) else f"{path}: {text}") from None
+
+
+def _kind(card: Card) -> str:
+    """The name of a card, or the word in it that says what it changes."""
+    if card.name == "MAT1" and card.text(8):
+        return "GE"
+    fluid = card.text(7).upper() if card.name == "PSOLID" else ""
+    return fluid if fluid in _FLUIDS else card.name
 
 
 def _take(deck: _Deck, card: Card) -> None:

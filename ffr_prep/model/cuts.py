@@ -109,9 +109,12 @@ def _stations(cuts: Cuts, length: float) -> Sequence[float | CutPlane]:
 
 
 def long_axis(points: Array) -> Array:
-    """(3,) unit vector along which the points (N, 3) reach farthest, its largest component positive."""
+    """(3,) unit vector of the principal axis along which the points (N, 3) reach farthest, its largest component positive."""
     offsets = points - points.mean(axis=0)
-    axis = np.linalg.eigh(offsets.T @ offsets)[1][:, -1]
+    axes = np.linalg.eigh(offsets.T @ offsets)[1][
+        :, ::-1
+    ]  # not simply the first: a fine mesh at one end turns it there
+    axis = axes[:, np.argmax(np.ptp(points @ axes, axis=0))]
     largest = int(np.argmax(np.abs(axis)))
     axis = np.eye(3)[largest] if abs(axis[largest]) > _ALONG else axis * np.sign(axis[largest])
     return np.asarray(axis)
@@ -181,7 +184,10 @@ def _with_strays_moved(part: Array, count: int, bonds: Array) -> Array:
         found = np.unique(pieces[part == k]).size
         if found != 1:
             state = f"falls into {found} pieces" if found else "has no elements"
-            raise InputError(f"part {k + 1} of {count} {state}: cut elsewhere, or into fewer parts")
+            raise InputError(
+                f"part {k + 1} of {count} {state}: cut elsewhere, by stations or planes (fp.CutPlane; in a structure file "
+                "point and normal), or into fewer parts"
+            )
     return part
 
 

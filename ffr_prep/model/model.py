@@ -38,7 +38,7 @@ class Model(Brief):
     massless   : some coordinates have no mass
     unstressed : stresses are not known, and with them neither `stiffening` nor `second`: the body is linear
     diagnose   : called when a computation has failed; raises InputError where the model is found to be the cause
-    cut        : the models of the parts that a body is cut into; None where the model cannot be cut
+    cut        : what makes the model of each part that a body is cut into; None where the model cannot be cut
 
     >>> model = fp.from_mesh(fp.read_mesh("rod.geo"), fp.material("steel"))
     """
@@ -58,7 +58,7 @@ class Model(Brief):
     massless: bool = False
     unstressed: bool = False
     diagnose: Callable[[], None] = lambda: None
-    cut: Callable[[Cuts], Sequence[Model]] | None = None
+    cut: Callable[[Cuts], Sequence[Callable[[], Model]]] | None = None
 
     def _rows(self) -> Rows:
         kind = [key for key in ("mesh", "frame", "matrices") if key in self.record]

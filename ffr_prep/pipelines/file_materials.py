@@ -24,7 +24,7 @@ from ffr_prep.mesh.geometry.face import METRES
 from ffr_prep.mesh.mesh import Mesh
 from ffr_prep.model.material import Material, Solid, orthotropic
 
-_ABAQUS, _NASTRAN = (".inp",), (".bdf", ".nas", ".fem")
+_ABAQUS, _NASTRAN = (".inp",), (".bdf", ".nas", ".fem", ".dat")
 CARRIERS = (*_ABAQUS, *_NASTRAN)
 _STIFFEST, _SOFTEST = (
     3e12,
@@ -151,6 +151,7 @@ def _read(path: Path) -> tuple[dict[str, _Constants], dict[str, str]]:
 def _of_abaqus(path: Path) -> tuple[dict[str, _Constants], dict[str, str]]:
     found: dict[str, _Constants] = {}
     of_group: dict[str, str] = {}
+    oriented: set[str] = set()  # materials, which are alike in all directions or have axes that are not read
     current = _Constants("")
     for keyword, parameters, rows in keyword_sections(path):
         if keyword == "MATERIAL":
@@ -169,11 +170,12 @@ def _of_abaqus(path: Path) -> tuple[dict[str, _Constants], dict[str, str]]:
             at = _temperature(rows, 1, 1)
             current.words += f" with its density{at}" if at else ""
         elif keyword == "SOLID SECTION":
-            if "ORIENTATION" in parameters:
-                raise InputError(f"{path}: a section has an ORIENTATION, which is not read; give --material with axes")
             group, name = (parameters.get(key, "").upper() for key in ("ELSET", "MATERIAL"))
             _once(f"element set {group!r}", "material", of_group.get(group), name)
             of_group[group] = name
+            oriented |= {name} if "ORIENTATION" in parameters else set()
+    if any(found[name].kind != "ISOTROPIC" for name in oriented & set(found)):
+        raise InputError(f"{path}: a section has an ORIENTATION, which is not read; give --material with axes")
     return found, of_group
 
 

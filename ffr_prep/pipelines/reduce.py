@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from importlib.metadata import version
 from typing import Any
@@ -15,6 +15,9 @@ from ffr_prep.body import (
     Damping,
     FlexibleBody,
     Interface,
+    cut_doubt,
+    cut_error,
+    cut_stress_doubt,
     mesh_doubt,
     shear_doubt,
     steady_stress_doubt,
@@ -124,9 +127,10 @@ def reduce(
         )
     reference = at_interfaces(request.reference, model.coupled.names, model.coupled.positions)
     request = replace(request, reference=reference)
+    parts = model.cut(request.parts) if model.cut and request.parts is not None else ()
     try:
         whole = _reduced(model, request, progress, advance)
-        whole = replace(whole, parts=tuple(_parts(model, request, progress, advance)))
+        whole = _with_cut_error(replace(whole, parts=tuple(_parts(parts, request, progress, advance))))
         return with_damping(whole, request.damping)
     except ComputationError:
         model.diagnose()
@@ -146,25 +150,31 @@ def _check_points(model: CoupledModel) -> None:
             )
 
 
-def _parts(model: Model, request: Request, progress: Stages, advance: Advance) -> Iterator[FlexibleBody]:
+def _parts(
+    parts: Sequence[Callable[[], Model]], request: Request, progress: Stages, advance: Advance
+) -> Iterator[FlexibleBody]:
     """The parts of the body, reduced one after the other."""
-    if request.parts is None or model.cut is None:
-        return
-    progress("cut into parts")
-    models = model.cut(request.parts)
-    for k, part in enumerate(models, 1):
-        own = replace(
-            request,
-            name=f"{request.name}_{k}",
-            reference=conditions_of_part(request.reference, part.coupled.names),
-            quality=None,
-            parts=None,
-        )
-        of = f"part {k} of {len(models)}"
+    for k, make in enumerate(parts, 1):
+        of = f"part {k} of {len(parts)}"
+        progress(f"{of}: assemble stiffness and mass")
         try:
+            part = make()
+            own = replace(
+                request,
+                name=f"{request.name}_{k}",
+                reference=conditions_of_part(request.reference, part.coupled.names),
+                quality=None,
+                parts=None,
+            )
             yield _reduced(part, own, lambda stage, of=of: progress(f"{of}: {stage}"), advance)  # type: ignore[misc]
-        except InputError as error:
-            raise InputError(f"{of}: {error}") from None
+        except (InputError, ComputationError) as error:
+            raise type(error)(f"{of}: {error}") from None
+
+
+def _with_cut_error(body: FlexibleBody) -> FlexibleBody:
+    found = cut_error(body)
+    warnings = [*body.provenance["warnings"], *filter(None, [cut_doubt(found), cut_stress_doubt(body)])]
+    return replace(body, provenance={**body.provenance, **found, "warnings": warnings})
 
 
 def _reduced(model: Model, request: Request, progress: Stages, advance: Advance) -> FlexibleBody:

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -94,15 +95,7 @@ def tied(parts: Mapping[str, Model], ties: Sequence[tuple[str, str]]) -> Model:
         stiffening=stiffening,
         second=second,
         recovery="; ".join(dict.fromkeys(m.recovery for m in models)),
-        record={
-            "parts": {
-                name: {k: v for k, v in part.record.items() if k not in ("warnings", WITHOUT_SHEAR)}
-                for name, part in parts.items()
-            },
-            "ties": [list(pair) for pair in ties],
-            WITHOUT_SHEAR: [name for part in parts.values() for name in part.record.get(WITHOUT_SHEAR, [])],
-            "warnings": _warnings(parts, ties),
-        },
+        record=_record(parts, ties),
         doubts=lambda basis: _doubts(parts, [x @ basis for x in own]),
         mesh_energy=lambda basis: _known_sum([m.mesh_energy(x @ basis) for m, x in zip(models, own, strict=True)]),
         damping=lambda basis: _known_sum([m.damping(x @ basis) for m, x in zip(models, own, strict=True)]),
@@ -114,9 +107,20 @@ def _doubts(parts: Mapping[str, Model], bases: Sequence[Array]) -> list[str]:
     return [f"{name}: {d}" for (name, m), basis in zip(parts.items(), bases, strict=True) for d in m.doubts(basis)]
 
 
-def _warnings(parts: Mapping[str, Model], ties: Sequence[tuple[str, str]]) -> list[str]:
-    of_parts = (f"{name}: {w}" for name, part in parts.items() for w in part.record.get("warnings", []))
-    return [*of_parts, *_long_arms(parts, ties)]
+def _record(parts: Mapping[str, Model], ties: Sequence[tuple[str, str]]) -> dict[str, Any]:
+    apart = ("notes", "warnings", WITHOUT_SHEAR)
+    return {
+        "parts": {name: {k: v for k, v in part.record.items() if k not in apart} for name, part in parts.items()},
+        "ties": [list(pair) for pair in ties],
+        WITHOUT_SHEAR: [name for part in parts.values() for name in part.record.get(WITHOUT_SHEAR, [])],
+        "notes": _of_parts("notes", parts),
+        "warnings": [*_of_parts("warnings", parts), *_long_arms(parts, ties)],
+    }
+
+
+def _of_parts(key: str, parts: Mapping[str, Model]) -> list[str]:
+    """The notes or warnings of the parts, with their names."""
+    return [f"{name}: {said}" for name, part in parts.items() for said in part.record.get(key, [])]
 
 
 def _long_arms(parts: Mapping[str, Model], ties: Sequence[tuple[str, str]]) -> list[str]:

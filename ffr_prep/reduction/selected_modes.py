@@ -67,8 +67,8 @@ def _accurate(
     else:
         raise ComputationError(
             f"with all {omega2.size} modes up to {_RICHER[-1] * wanted.band.high:.4g} Hz the receptances at the interfaces "
-            f"are still more than {wanted.tolerance:g} off: allow a larger error or, with eigenmodes alone, use "
-            "craig-bampton or rubin, which also carry static shapes"
+            f"are still more than {wanted.tolerance:g} off: allow a larger error, or use rubin, whose static shapes carry "
+            "the flexibility of all higher modes"
         )
     enough = omega2.size
     while enough - few > 1:

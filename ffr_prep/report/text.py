@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ffr_prep.body import MESH_ERROR, STEADY_STRESS, FlexibleBody, mesh_errors_of
+from ffr_prep.body import CUT_ERROR, MESH_ERROR, STEADY_STRESS, FlexibleBody, cut_errors_of, mesh_errors_of
 from ffr_prep.body.interface_freedom import interface_freedom
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.in_words import settings_in_words, vector_in_words
@@ -23,6 +23,7 @@ _MOST_NAMES = 20
 _MOST_INTERFACES = 24
 _CLOSE = 0.01
 _NOISE = 1e-6
+_UNFELT = 1e-4  # of a frequency
 _DRAWN = ("outline", "shear")
 
 
@@ -131,10 +132,15 @@ def _region_lines(provenance: Mapping[str, Any]) -> Iterator[str]:
 
 
 def part_lines(body: FlexibleBody) -> Iterator[str]:
-    """The parts that a body is cut into: how many, and for each its mass, coordinates and interfaces."""
+    """The parts that a body is cut into: of each its mass, coordinates and interfaces; and how much its cuts stiffen it."""
     for k, part in enumerate(body.parts):
         names = ", ".join(interface.name for interface in part.interfaces)
         yield f"{'' if k else 'parts':12}{part.name}  {part.mass:.5g} kg, {part.n} elastic coordinates, {names}"
+    errors = cut_errors_of(body.provenance)
+    if body.parts and errors:
+        felt = [f"{_percent(error)} ({mode})" for mode, error in enumerate(errors, 1) if error >= _UNFELT]
+        each = f"{', '.join(felt)}; in brackets the mode" if felt else f"less than {_percent(_UNFELT)}"
+        yield f"cut error   frequencies of the free body too high by {each}"
 
 
 def mode_lines(body: FlexibleBody) -> Iterator[str]:
@@ -297,6 +303,7 @@ def _origin_lines(provenance: Mapping[str, Any]) -> Iterator[str]:
             "held_body",
             MESH_ERROR,
             STEADY_STRESS,
+            CUT_ERROR,
             "regions",
             "command",
         ):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -85,10 +86,11 @@ def from_mesh(
             },
             "material": described(material),
             "interfaces": [_described(plain, interface) for interface in interfaces],
+            "notes": list(mesh.notes),
             "warnings": [*mesh_warnings(mesh), *doubts_of_materials(material)],
         },
         mesh_energy=lambda basis: added_energy(mesh, material, [i.region or i.name for i in interfaces], field(basis)),
-        cut=lambda cuts: [from_mesh(*part) for part in cut_mesh(mesh, material, interfaces, cuts)],
+        cut=lambda cuts: [partial(from_mesh, *part) for part in cut_mesh(mesh, material, interfaces, cuts)],
     )
 
 

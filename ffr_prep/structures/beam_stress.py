@@ -45,7 +45,7 @@ def stressed_sweep(frame: Frame, elements: Beams, moved: Moved, modes: Array) ->
         at_stations = section_forces_at(modes[own], xi)
         tau = np.tile(shear, (len(xi) // len(shear), 1, 1))
         of_own = _outline_stress(member.section, elements.C[own], across, tau, at_stations)
-        stress.append(of_own.reshape(-1, 6, modes.shape[3]))
+        stress.append(of_own.reshape(len(own) * len(xi), 6, modes.shape[3]))
         moduli.append(np.tile([member.material.E, member.material.nu], (len(stress[-1]), 1)))
     return replace(
         swept_surface(frame, elements, moved),

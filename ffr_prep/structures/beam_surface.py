@@ -29,7 +29,7 @@ def swept_surface(frame: Frame, elements: Beams, moved: Moved) -> Surface:
         points.append(undeformed(picked(elements, own), xi, across).reshape(-1, 3))
         triangles.append((first[:, None, None] + _prism(len(outline))).reshape(-1, 3))
         at_points = moved(own, xi, across)
-        shapes.append(at_points.reshape(-1, 3, at_points.shape[-1]))
+        shapes.append(at_points.reshape(len(points[-1]), 3, at_points.shape[-1]))
         count += len(points[-1])
     return Surface(np.vstack(points), np.vstack(triangles), np.vstack(shapes))
 

@@ -137,5 +137,5 @@ def connectivity(nodes: Array, count: int) -> sp.csr_array:
 
 def element_values(part: Family, q_n: Array) -> Array:
     """(E, 6k, n) the coordinates of each element, B_1 q_n, of the nodal coordinates (6N, n)."""
-    by_node = q_n.reshape(-1, 6, q_n.shape[1])
-    return by_node[part.nodes].reshape(len(part.nodes), -1, q_n.shape[1])
+    by_node = q_n.reshape(len(q_n) // 6, 6, q_n.shape[1])
+    return by_node[part.nodes].reshape(len(part.nodes), 6 * part.nodes.shape[1], q_n.shape[1])

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -114,7 +115,7 @@ def from_frame(frame: Frame, interfaces: Sequence[InterfaceRegion] = (), *, prog
         second=second,
         recovery="; ".join(dict.fromkeys(part.recovery for part in parts)),
         record=_record(frame, interfaces, coupled, parts),
-        cut=lambda cuts: [from_frame(*part) for part in cut_frame(frame, interfaces, cuts)],
+        cut=lambda cuts: [partial(from_frame, *part) for part in cut_frame(frame, interfaces, cuts)],
     )
 
 
@@ -176,7 +177,8 @@ def inertia(part: Family, nodal: Array) -> InertiaIntegrals:
 def _inertia(part: Family, nodal: Array, own: slice) -> InertiaIntegrals:
     Phi = part.field[own] @ nodal[own, None]
     mass = sp.diags_array(part.mass[own].ravel())
-    return inertia_integrals(part.positions[own].reshape(-1, 3), mass, Phi.reshape(-1, 3, nodal.shape[2]))
+    positions = part.positions[own].reshape(-1, 3)
+    return inertia_integrals(positions, mass, Phi.reshape(len(positions), 3, nodal.shape[2]))
 
 
 # ---- what is known about the body ---------------------------------------------------------------------------------

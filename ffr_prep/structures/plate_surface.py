@@ -42,7 +42,7 @@ def plate_faces(elements: Plates, nodes: Array, nodal: Array) -> Surface:
     at = np.tile(_CORNERS[k], (2, 1))
     half = _heights(elements)
     points = undeformed(elements, at, half).reshape(-1, 3)
-    shapes = (field(elements, at, half) @ nodal[:, None]).reshape(len(points), 3, -1)
+    shapes = (field(elements, at, half) @ nodal[:, None]).reshape(len(points), 3, nodal.shape[2])
     kept, place = _shared(nodes, elements, half)
     triangles = place[np.vstack([_faces(count, k), _edges(nodes)])]
     return Surface(points[kept], triangles, shapes[kept])
@@ -69,7 +69,7 @@ def stressed_faces(
                pairs, the strain of second order included
     """
     kept, place = _shared(nodes, elements, _heights(elements))
-    stress = _corner_stress(elements, nodal, products).reshape(len(place), 6, -1)
+    stress = _corner_stress(elements, nodal, products).reshape(len(place), 6, nodal.shape[2])
     total = np.zeros((len(kept), *stress.shape[1:]))
     np.add.at(total, place, stress)
     moduli = np.repeat(np.stack([elements.E, elements.nu], axis=1), 2 * nodes.shape[1], axis=0)

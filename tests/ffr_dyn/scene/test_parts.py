@@ -15,6 +15,7 @@ from ffr_dyn.analyses.linearise import linearise
 from ffr_dyn.analyses.settings import Settings
 from ffr_dyn.analyses.states import scene_at
 from ffr_dyn.analyses.static import static
+from ffr_dyn.consistency.assemble import assemble
 from ffr_dyn.consistency.mobility import mobility
 from ffr_dyn.consistency.validity import parts_needed
 from ffr_dyn.integrators import ROS2
@@ -29,7 +30,7 @@ from ffr_dyn.scene.sensors import SectionMeasurement, StressMeasurement
 from ffr_dyn.scene_file.read import load_scene
 from ffr_dyn.scene_file.write import save_scene
 from ffr_dyn.variants.variant import vary
-from ffr_prep.body import FlexibleBody
+from ffr_prep.body import FlexibleBody, cut_doubt, damped, mesh_doubt
 from ffr_prep.common.errors import InputError
 from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.reference import FixedTo
@@ -327,3 +328,40 @@ def test_a_bent_body_in_parts_stays_as_it_is_where_a_result_has_left_it():
     assert not [
         note for note in linearise(scene_at(still, bent)).notes if "assembly" in note or "no equilibrium" in note
     ]
+
+
+def test_notes_on_the_mesh_and_on_cuts_are_those_of_the_whole():
+    """The frequencies of a short part say nothing of the mesh of a long body."""
+    model = bar(4)
+    assert mesh_doubt(model.provenance) is None
+    assert all(mesh_doubt(part.provenance) for part in model.parts)
+    notes = assemble(clamped(model)).notes
+    assert not any("mesh is too coarse" in note for note in notes)
+    assert f"body 'beam': {cut_doubt(model.provenance)}" in notes
+
+
+@pytest.mark.parametrize("stiffening", [False, True])
+def test_damping_that_parts_do_not_keep_is_told_with_its_ratios(stiffening):
+    model = beam(4, 4, stiffening=stiffening)
+    free = linearise(Scene((Body("beam", model, damping=0.01),)))
+    slowest = np.flatnonzero(free.frequencies > 1.0)[0]
+    [note] = [note for note in assemble(Scene((Body("beam", model, damping=0.01),))).notes if "its parts damp" in note]
+    assert (
+        f"of {free.frequencies[slowest]:.4g} Hz by a ratio of {free.damping_ratios[slowest]:.2g}, and one piece by"
+        in note
+    )
+    for kept in (
+        Body("beam", damped(model, beta=1e-5)),
+        Body("beam", model),
+        Body("beam", beam(None, 4), damping=0.01),
+    ):
+        assert not any("its parts damp" in note for note in assemble(Scene((kept,))).notes)
+    assert any("its parts damp" in note for note in assemble(Scene((Body("beam", damped(model, alpha=2.0)),))).notes)
+
+
+def test_stress_beside_a_cut_is_told_by_runs_that_measure_it_and_kept_for_reports():
+    measured = (StressMeasurement("a", "beam", (0.1, 0, 0.02)), StressMeasurement("b", "beam", (0.6, 0, 0.02)))
+    result = static(pushed(bar(4), measurements=measured))
+    told = "its stress within about a section's width of a cut is that of a section which is held rigid"
+    assert len([note for note in result.attributes["notes"] if told in note]) == 1
+    assert told in result.attributes["stress_lacks"]["beam_1"]

@@ -3,6 +3,7 @@
 import re
 from dataclasses import replace
 
+import meshio
 import numpy as np
 import pytest
 from boxes import box_mesh
@@ -104,6 +105,18 @@ def test_numbers_without_the_letter_of_their_exponent(text, value):
     assert Card("X", [text], 1).real(1, -1.0) == value
 
 
+def test_data_files_are_bulk_data_or_tecplots(tmp_path):
+    mesh = box("hex8")
+    (tmp_path / "a.dat").write_text(
+        deck(mesh, "hex8", free).replace("ENDDATA", "PSOLID,7,5\nMAT1,5,2.1+11,,.3,7850.\nENDDATA", 1)
+    )
+    given = fp.read_mesh(tmp_path / "a.dat")
+    assert_same_mesh(given, mesh)
+    assert [material.name for material in fp.file_materials(tmp_path / "a.dat", given).values()] == ["MAT1 5"]
+    meshio.write(tmp_path / "b.dat", meshio.Mesh(mesh.points, [("hexahedron", mesh.blocks[0].nodes)]))
+    np.testing.assert_allclose(fp.read_mesh(tmp_path / "b.dat").points, mesh.points)
+
+
 def test_faces_sets_and_what_is_ignored(tmp_path):
     plain = box("hex8")
     face = ",".join(str(n + 1) for n in plain.blocks[0].nodes[0][[0, 3, 2, 1]])
@@ -130,6 +143,7 @@ def test_faces_sets_and_what_is_ignored(tmp_path):
         ("MAT1,5,2.1+11,,.3,7850.,,,0.02", "1 GE left out: damping"),
         ("MATT1,5,21", "1 MATT1 left out: tables over temperature"),
         ("MATS1,5,,PLASTIC", "1 MATS1 left out: yield and creep"),
+        ("PSOLID,8,5,,,,,PFLUID", "1 PFLUID left out: acoustic elements"),
         ("DMIG,K2GG,0,6,1,0", "1 DMIG left out: matrices"),
     ],
 )
@@ -332,6 +346,11 @@ def test_orthotropic_materials_and_those_that_are_not_read(tmp_path):
     (material,) = fp.file_materials(tmp_path / "a.inp", mesh).values()
     expected = fp.orthotropic("Stahl", E=(1.2e10, 8e8, 5e8), nu=(0.4, 0.3, 0.3), G=(7e8, 7e8, 8e7), rho=7850.0)
     np.testing.assert_allclose(material.elasticity_tensor(), expected.elasticity_tensor(), rtol=1e-9)
+    (tmp_path / "o.inp").write_text(inp("m", nine).replace("SECTION, ", "SECTION, ORIENTATION=o, "))
+    with pytest.raises(InputError, match="a section has an ORIENTATION"):
+        fp.file_materials(tmp_path / "o.inp", mesh)
+    (tmp_path / "i.inp").write_text(inp("m").replace("SECTION, ", "SECTION, ORIENTATION=o, "))
+    assert len(fp.file_materials(tmp_path / "i.inp", mesh)) == 1  # alike in all directions
     for elastic, said in ((", TYPE=ANISOTROPIC\n1.,2.", "TYPE ANISOTROPIC"), ("\nx, .3", "no number")):
         (tmp_path / "b.inp").write_text(inp("m", elastic))
         with pytest.raises(InputError, match=said):

@@ -251,6 +251,16 @@ def test_flat_element():
         check_mesh(mesh)
 
 
+def test_wedges_written_as_hexahedra_are_told():
+    mesh = box_mesh("hex8", tuple(SIZE), CELLS)
+    nodes = mesh.blocks[0].nodes.copy()
+    nodes[0, [2, 6]] = nodes[0, [3, 7]]
+    with pytest.raises(
+        InputError, match=r"1 elements name a node twice, the first being element 0 .* collapsed hexahedra"
+    ):
+        check_mesh(replace(mesh, blocks=(Block("hex8", nodes),)))
+
+
 def test_element_folded_by_a_midside_node_only():
     """Corners in order, but one mid-edge node far beyond the quarter points folds the element."""
     mesh = box_mesh("tet10", (1, 1, 1), (1, 1, 1))
@@ -677,6 +687,8 @@ def test_abaqus_elements_that_are_no_solids_are_noted(deck):
         ("*Cload\n1, 1, 3.\n", "1 *CLOAD left out: loads", "scene"),
         ("*Shell Section, elset=Both\n1.\n", "1 *SHELL SECTION left out: shells", "as faces"),
         ("*Material, name=m\n*Damping, alpha=2.\n", "1 *DAMPING left out: damping", "--rayleigh"),
+        ("*Model Change, remove\nBoth\n", "1 *MODEL CHANGE left out: elements that a step takes out", "delete"),
+        ("*Initial conditions, type=stress\n", "1 *INITIAL CONDITIONS left out: initial", "without stress"),
         ("*User Element, nodes=2\n", "1 *USER ELEMENT left out: matrices", "reduce-matrices"),
     ],
 )
@@ -684,6 +696,31 @@ def test_abaqus_cards_that_would_change_the_body_are_told(deck, card, start, rem
     (note,) = set(read_mesh(deck(DECK + card)).notes) - set(read_mesh(deck(DECK)).notes)
     assert note.startswith(start)
     assert remedy in note
+
+
+def test_abaqus_reference_points_of_an_assembly_are_no_nodes_of_its_part(deck):
+    """Programs with a window number them from one again, and so the springs there."""
+    part, sets = DECK.split("*Nset", 1)
+    inside = f"*Part, name=cube\n{part}*Nset{sets}*End Part\n"
+    assembly = (
+        "*Assembly, name=a\n*Instance, name=cube-1, part=cube\n*End Instance\n*Node\n1, 5., 5., 5.\n2, 5., 5., 6.\n"
+        "*Nset, nset=Points\n1, 2\n*Surface, type=NODE, name=Point\nPoints, 1.\n*Elset, elset=Springs\n10\n"
+        "*Nset, nset=Four, instance=cube-1\n1, 2, 3, 4\n*End Assembly\n"
+    )
+    plain, mesh = read_mesh(deck()), read_mesh(deck(inside + assembly))
+    np.testing.assert_array_equal(mesh.points, plain.points)
+    assert mesh.node_groups.keys() - plain.node_groups.keys() == {"Four"}
+    assert mesh.volume_groups.keys() == plain.volume_groups.keys()
+    assert mesh.notes[1].startswith("2 nodes of the assembly left out: reference points are those of interfaces")
+
+
+def test_abaqus_node_sets_of_element_sets(deck):
+    mesh = read_mesh(deck(DECK + "*Nset, nset=Below, elset=Lower\n*Nset, nset=Below\n9\n"))
+    np.testing.assert_array_equal(mesh.node_groups["Below"], range(9))
+
+
+def test_abaqus_surfaces_of_everything_are_left_out(deck):
+    assert any(note.startswith("surface 'All'") for note in read_mesh(deck(DECK + "*Surface, name=All\n, S1\n")).notes)
 
 
 @pytest.mark.parametrize(

@@ -10,16 +10,18 @@ from boxes import STEEL, box_mesh
 
 from ffr_prep.body import BodyError, FlexibleBody, load_body, save_body, truncated, with_point
 from ffr_prep.cli import main
-from ffr_prep.common.errors import InputError
+from ffr_prep.common.errors import ComputationError, InputError
 from ffr_prep.mesh.mesh import Mesh
 from ffr_prep.model.coupled import InterfaceRegion
-from ffr_prep.model.cuts import CutPlane
+from ffr_prep.model.cuts import CutPlane, long_axis
 from ffr_prep.model.model import Model
 from ffr_prep.model.reference import FixedTo, MeanAxis, SimplySupported
 from ffr_prep.pipelines.reduce import Request, reduce
 from ffr_prep.pipelines.structure_file import read_structure
 from ffr_prep.reduction.conversion import with_reference
 from ffr_prep.reduction.methods.craig_bampton import CraigBampton
+from ffr_prep.reduction.methods.rubin import Rubin
+from ffr_prep.reduction.selection import Accuracy, Band
 from ffr_prep.report.text import body_lines
 from ffr_prep.solids.model import from_mesh
 from ffr_prep.structures.frame import Member, Shell, named, panel, polyline
@@ -100,6 +102,22 @@ def test_stations_are_distances_from_the_end_along_the_long_axis():
     for k, station in ((0, 0.2), (1, 0.6)):
         at = body.parts[k].interface(f"cut_{k + 1}_a").position
         np.testing.assert_allclose(at, station * np.array([0.6, 0.8, 0.0]), atol=1e-12)
+
+
+def test_the_long_axis_is_not_that_of_the_finest_mesh():
+    """A hammer whose head has a hundred times as many nodes for its length as its shaft of one metre."""
+    shaft, head = np.linspace([0, 0, 0], [1, 0, 0], 11), np.linspace([1, -0.15, 0], [1, 0.15, 0], 1001)
+    np.testing.assert_array_equal(long_axis(np.concatenate([shaft, head])), [1, 0, 0])
+
+
+def test_cuts_that_cannot_be_made_are_refused_before_the_whole_is_reduced():
+    stages: list[str] = []
+    model = beam()
+    with pytest.raises(InputError, match="into two or more parts"):
+        reduce(
+            model, Request(name="bar", reference=MeanAxis(), reduction=CraigBampton(2), parts=1), progress=stages.append
+        )
+    assert not stages
 
 
 def test_planes_of_ones_own():
@@ -205,6 +223,14 @@ def test_parts_that_do_not_make_up_the_body():
 def test_a_short_part_is_named_where_its_modes_do_not_suffice():
     with pytest.raises(InputError, match="part 1 of 8: asked for 12 normal modes"):
         cut(beam(), 8, reduction=CraigBampton(12))
+
+
+def test_a_short_part_whose_receptances_need_more_than_its_slow_modes_is_named_with_the_way_out():
+    """Along its axis a part is so stiff that no mode near the band has its flexibility; Rubin's static shapes do."""
+    slow = Accuracy(Band(1.0, 200.0), 0.01)
+    with pytest.raises(ComputationError, match=r"part 1 of 4: with all .* use rubin"):
+        cut(beam(), 4, reduction=CraigBampton(slow))
+    assert len(cut(beam(), 4, reduction=Rubin(slow)).parts) == 4
 
 
 STRUCTURE = """

@@ -212,6 +212,39 @@ def test_a_solid_is_tied_to_a_frame(tmp_path):
     np.testing.assert_array_equal(load_body(tmp_path / "b.ffr").PP_dm, body.PP_dm)
 
 
+CUBE = """*NODE
+1, 0., 0., 0.
+2, .1, 0., 0.
+3, .1, .1, 0.
+4, 0., .1, 0.
+5, 0., 0., .1
+6, .1, 0., .1
+7, .1, .1, .1
+8, 0., .1, .1
+*ELEMENT, TYPE=C3D8, ELSET=all
+1, 1, 2, 3, 4, 5, 6, 7, 8
+*NSET, NSET=left
+1, 4, 5, 8
+*NSET, NSET=right
+2, 3, 6, 7
+*ELEMENT, TYPE=MASS, ELSET=lump
+2, 7
+*MASS, ELSET=lump
+1.5
+"""
+
+
+def test_what_the_mesh_of_a_solid_leaves_out_is_told_with_its_name(tmp_path, capsys):
+    (tmp_path / "cube.inp").write_text(CUBE)
+    text = SOLID.replace("box.geo", "cube.inp").replace("numbers = {nx = 6, ny = 1, nz = 1}", "")
+    path = written(tmp_path, text)
+    [note] = read_structure(path).model().record["notes"]
+    assert note.startswith("block: 1 MASS left out: masses")
+    main(["reduce-structure", str(path), "-o", str(tmp_path / "b.ffr")])
+    assert f"note        {note}" in capsys.readouterr().out
+    assert load_body(tmp_path / "b.ffr").provenance["notes"] == [note]
+
+
 @pytest.mark.parametrize(
     ("old", "new", "says"),
     [

@@ -58,6 +58,7 @@ MESHES = [
     changed(points=TWO),
     changed(volume_groups={"a": np.zeros(0, int)}),
     changed(blocks=blocks(HEX[[0, 0, 1]])),
+    changed(blocks=blocks(np.vstack([HEX[0][[0, 1, 3, 3, 4, 5, 7, 7]], HEX[1]]))),
     changed(points=moved(0, PLAIN.points[11])),
     changed(points=PLAIN.points * [1, 1, -1]),
     changed(points=SEAM, blocks=blocks(OPENED)),
@@ -133,11 +134,15 @@ DECKS = [
     of("mesh.frd", (" -1         1    3", " -1         1    2")),
     of("mesh.vtu", ("VTKFile", "VTK")),
 ]  # fmt: skip
+NINE = (
+    "*ELASTIC\n2.1e11, 0.3",
+    "*ELASTIC, TYPE=ENGINEERING CONSTANTS\n1.2e10, 8e8, 5e8, .4, .3, .3, 7e8, 7e8\n8e7",
+)
 MATERIALS = [
     edited(materials, "block.inp", ("MATERIAL=STEEL", "MATERIAL=BRASS")),
     edited(materials, "block.inp", ("2.1e11", "2.1e5")),
     edited(materials, "block.inp", ("*DENSITY\n7850.\n", "")),
-    edited(materials, "block.inp", ("SECTION, ELSET", "SECTION, ORIENTATION=o, ELSET")),
+    edited(materials, "block.inp", ("SECTION, ELSET", "SECTION, ORIENTATION=o, ELSET"), NINE),
     edited(materials, "block.inp", ("*ELASTIC", "*ELASTIC, TYPE=LAMINA")),
     edited(materials, "block.inp", ("2.1e11", "stiff")),
     edited(materials, "block.inp", ("*DENSITY\n7850.\n", "*DENSITY\n7850.\n*DENSITY\n7800.\n")),

@@ -201,7 +201,7 @@ BASES = [
     ),
     Case(
         lambda: with_part(selected_modes, "_RICHER", (0.01,), lambda: by_accuracy(fp.Eigenmodes, LOW, 1e-6)),
-        lambda: by_accuracy(fp.CraigBampton, LOW, 1e-2),
+        lambda: by_accuracy(fp.Rubin, LOW, 1e-2),
     ),
     Case(
         lambda: with_part(of_models, "_WHOLE", 1, lambda: modes_up_to(COUPLED, held(), 1e9)),
