@@ -19,8 +19,7 @@ from ffr_dyn.results.result import Quantity, Result
 from ffr_dyn.studies import draw
 from ffr_dyn.studies.draw import changing_most, running_mean, tornado
 from ffr_dyn.studies.measures import attribute, measured
-from ffr_dyn.studies.plan import mark
-from ffr_dyn.studies.runs import Row, body_file
+from ffr_dyn.studies.runs import Row
 from ffr_dyn.studies.table import Journal, journal_of, table
 from ffr_prep.common.errors import ComputationError, InputError
 from ffr_prep.common.outputs import reserved
@@ -117,7 +116,7 @@ def test_whole_histories_are_rows_of_a_dimension_of_their_own(folder, monkeypatc
     coloured = []
     monkeypatch.setattr(draw, "changing_most", lambda x, y: coloured.append(changing_most(x, y)) or coloured[-1])
     assert {path.name for path in fd.plot_study(table, folder / "p", ["h"])} == {"h.png", "pairs.png"}
-    assert coloured == [["analysis.end", "g"]]
+    assert coloured == [["g", "analysis.end"]]  # by 0.034 and 0.025 rad of the mean
 
 
 def test_attributes_are_found_by_the_path_of_their_keys():
@@ -295,6 +294,40 @@ def test_histories_are_not_computed_again(folder):
     assert (folder / "t.nc").read_bytes() == (folder / "whole.nc").read_bytes()
 
 
+def test_formulas_of_formulas_are_worked_out(folder):
+    outputs = {
+        "twice": "= 2 * weight",
+        "force": "hinge.force: largest",
+        "weight": "= force / g",
+        "same": "= weight + 0",
+    }
+    table = fd.sweep(fd.study(folder / "bar.toml", {"g": [5.0]}, outputs), folder / "t.nc", workers=0)
+    assert table["twice"] / 2 == table["weight"] == table["same"] == table["force"] / 5.0
+
+
+@pytest.mark.parametrize(
+    "parameters",
+    [
+        {"bodies": {"bar": {"mass": [1.0, 2.0]}}, "gravity": {"2": [-9.81]}},
+        {"bodies": {"bar.mass": [1.0, 2.0]}, "gravity.2": [-9.81]},
+        {"bodies.bar.mass": [1.0, 2.0], "gravity": {"2": -9.81}},
+    ],
+)
+def test_names_with_dots_may_be_tables(folder, parameters):
+    """As TOML reads `bodies.bar.mass = [1, 2]`, which is no distribution of the parameter `bodies.bar`."""
+    made = fd.study(folder / "bar.toml", parameters, {"angle": "hinge.angle: last"})
+    assert made.points == ({"bodies.bar.mass": 1.0, "gravity.2": -9.81}, {"bodies.bar.mass": 2.0, "gravity.2": -9.81})
+
+
+def test_switches_are_what_a_scene_file_has(folder):
+    scene = (folder / "bar.toml").read_text().replace("step = 1e-3", "step = 1e-3\ncheck = true")
+    (folder / "bar.toml").write_text(scene)
+    made = fd.study(folder / "bar.toml", {"analysis.check": ["true", "false"]}, {"angle": "hinge.angle: last"})
+    table = fd.sweep(made, folder / "t.nc", workers=0)
+    assert list(table["analysis.check"]) == ["true", "false"]
+    assert not table.failed.size
+
+
 def test_a_linear_output_has_the_statistics_of_its_parameter(folder):
     """The load of a bar at rest is its weight: mean, deviation and quantiles are g times those of the mass; strata, too."""
     scene = SCENE.replace("revolute", "fixed").replace("step = 1e-3", "step = 0.01").replace("end = 0.2", "end = 0.01")
@@ -318,26 +351,6 @@ def test_a_linear_output_has_the_statistics_of_its_parameter(folder):
 def test_lines_that_make_bodies_are_looked_at(folder, line, says):
     with pytest.raises(InputError, match=says):
         fd.study(folder / "bar.toml", {"diameter": [1, 2]}, {"angle": "hinge.angle: last"}, bodies={"bar": line})
-
-
-@pytest.mark.parametrize("change", ["a body", "a geometry", "histories"])
-def test_a_study_whose_files_have_changed_is_another(folder, change):
-    """Rows of a body before and of one after its change are not put into one table."""
-    scene = SCENE.replace("[joints.hinge]", '[bodies.other]\nfile = "other.ffr"\n[joints.hinge]')
-    (folder / "bar.toml").write_text(scene)
-    (folder / "other.ffr").write_text("a")
-    (folder / "rod.geo").write_text("b")
-    given = {"scene": folder / "bar.toml", "outputs": {"angle": "hinge.angle: last"}, "folder": folder}
-    recipe = {"other": "reduce rod.geo --set d=${d}"}
-
-    def marked(histories=False):
-        return mark(fd.study(parameters={"d": [1, 2]}, bodies=recipe, histories=histories, **given))
-
-    before = marked()
-    assert marked() == before
-    if change != "histories":
-        (folder / ("other.ffr" if change == "a body" else "rod.geo")).write_text("c")
-    assert marked(histories=change == "histories") != before
 
 
 def test_a_table_of_another_format_is_refused(folder):
@@ -380,6 +393,7 @@ def test_parameters_with_units_are_numbers_in_si(folder, given, column, unit):
     ({"from": "10 mm", "to": "1000 mm", "count": 3, "spacing": "log"}, [0.01, 0.1, 1.0], "m"),
     ({"uniform": ["10 in", "20 in"]}, None, "m"),
     ({"lognormal": ["10 in", 0.1]}, None, "m"),
+    ({"truncnorm": [-2, 2, "50 cm", "10 mm"]}, None, "m"),
 ])  # fmt: skip
 def test_ranges_and_distributions_take_units(folder, given, expected, unit):
     """They run as numbers in SI do, and the unit is looked at as that of any text."""
@@ -541,13 +555,3 @@ def test_entries_of_structure_files_and_of_scenes_are_varied(tmp_path):
     assert (table["stable"] == 1).all()
     assert np.allclose(sag[d == 0.01] / sag[d == 0.02], 4.0, rtol=1e-3)
     assert np.allclose(sag / np.abs(table["gravity.2"]) * d**2, sag[0] / 9.81 * 1e-4, rtol=1e-3)
-
-
-def test_a_body_is_known_by_the_files_that_its_files_name(tmp_path):
-    (tmp_path / "frame.toml").write_text('[geometry]\nfile = "frame.geo"\n')
-    (tmp_path / "frame.geo").write_text("Point(1) = {0, 0, 0};")
-    line = "reduce-structure frame.toml"
-    before = body_file(line, tmp_path, tmp_path)
-    assert body_file(line, tmp_path, tmp_path) == before
-    (tmp_path / "frame.geo").write_text("Point(1) = {1, 0, 0};")
-    assert body_file(line, tmp_path, tmp_path) != before
