@@ -14,7 +14,8 @@ from typing import Any
 from ffr_dyn.scene_file.assignments import assigned
 from ffr_dyn.scene_file.parameters import Parameters, flattened, substituted
 from ffr_dyn.scene_file.source import PATHS, read_source
-from ffr_dyn.studies.plan import Study, as_texts, mentions, recipe
+from ffr_dyn.studies.measures import mentions
+from ffr_dyn.studies.plan import Study, as_texts, recipe
 from ffr_dyn.studies.sampling import Value
 from ffr_prep.common.entries import places_of, value_at
 from ffr_prep.common.errors import InputError

@@ -39,7 +39,7 @@ from ffr_dyn.scene_file.assignments import unknown
 from ffr_dyn.scene_file.parameters import PLACEHOLDER, flattened, nearest, substituted
 from ffr_dyn.scene_file.read import body_files
 from ffr_dyn.scene_file.source import read_source
-from ffr_dyn.studies.measures import HISTORY, Measured, measured
+from ffr_dyn.studies.measures import HISTORY, Measured, measured, mentions
 from ffr_dyn.studies.sampling import (
     SHAPING,
     USUAL,
@@ -396,11 +396,6 @@ def _check_bodies(made: Study) -> None:
                 f"bodies.{name}: {line!r}: begin with a command of ffr-prep that makes a body: {', '.join(MAKING)}"
             )
         substituted(line, made.points[0], f"bodies.{name}.make")
-
-
-def mentions(text: str, name: str) -> bool:
-    """Whether a formula, or a text with "${name}", has a name."""
-    return re.search(rf"(?<![\w.]){re.escape(name)}(?![\w.])", text) is not None
 
 
 def _texts(tree: Any, where: tuple[str, ...] = ()) -> Iterator[str]:

@@ -55,7 +55,8 @@ class Task:
 
 @dataclass(frozen=True)
 class Row:
-    """The outcome of a run: its numbers and histories with their units, and what the run notes; or why there are none."""
+    """The outcome of a run: its numbers and histories with their units, and what the run notes; why there are none, or not
+    of all outputs."""
 
     number: int
     values: Mapping[str, Number]
@@ -92,12 +93,16 @@ def _row(task: Task, point: Point) -> Row | Full:
         scene, settings = load_scene(task.scene, point.of_scene, bodies)
         path = f"{task.histories}/run-{point.number:06d}.nc" if task.histories else None
         result = run(scene, _kept(settings, task.outputs, bool(path)), path=path)
-        found = values(task.outputs, result, point.parameters)
+        found, why = values(task.outputs, result, point.parameters)
         notes = BETWEEN.join(map(str, result.attributes.get("notes", ())))
-        return Row(point.number, found, units=units(task.outputs, result), notes=notes)
+        return Row(point.number, found, _in_a_line("; ".join(why)), units(task.outputs, result, found), notes)
     except (InputError, BodyError, ComputationError) as error:
-        message = " ".join(str(error).split())
+        message = _in_a_line(str(error))
         return Full(message) if no_room(error) else Row(point.number, {}, message)
+
+
+def _in_a_line(text: str) -> str:
+    return " ".join(text.split())
 
 
 @lru_cache(maxsize=LOADED)
@@ -141,7 +146,7 @@ def make(recipe: Recipe) -> str | Full:
         except InUseError:
             time.sleep(WAIT)
         except Exception as error:  # also click's own of a word that it does not know
-            why = " ".join(getattr(error, "message", str(error)).split())
+            why = _in_a_line(getattr(error, "message", str(error)))
             return Full(why) if no_room(error) else why
     return ""
 

@@ -65,7 +65,7 @@ def sweep(
                 end.add_note(f"{kept}, and the same command goes on with them")
                 raise
         found = table(made, journal.rows)
-        if found.failed.size == len(found):
+        if not any(row.values for row in journal.rows.values()):
             journal_of(path).unlink()
             raise ComputationError(f"no run has succeeded; the first says: {found.messages[0]}")
         save_table(found, path)

@@ -44,9 +44,9 @@ class Table(Brief):
     """The rows of a study.
 
     parameters : by name, a value of every run: numbers (N,), in SI where they were written with a unit, or texts
-    outputs    : by name (N,), NaN for runs that failed or were not done; of histories (N, T), NaN beyond the last row of a
+    outputs    : by name (N,), NaN where a run has none, as one that failed; of histories (N, T), NaN beyond the last row of a
                  run, with "time" [s] (N, T)
-    messages   : why a run has failed; empty for the others
+    messages   : why a run has failed, or has not all outputs; empty for the others
     notes      : what the run of a row notes of itself, such as rows too coarse for what moves between them
     units      : of outputs that are of a quantity of the runs; of parameters whose value the scene or the study writes with
                  a unit, in SI

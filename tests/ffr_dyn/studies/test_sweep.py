@@ -18,7 +18,7 @@ import ffr_prep.cli
 from ffr_dyn.results.result import Quantity, Result
 from ffr_dyn.studies import draw
 from ffr_dyn.studies.draw import changing_most, running_mean, tornado
-from ffr_dyn.studies.measures import attribute, measured
+from ffr_dyn.studies.measures import attribute, measured, values
 from ffr_dyn.studies.runs import Row
 from ffr_dyn.studies.table import Journal, journal_of, table
 from ffr_prep.common.errors import ComputationError, InputError
@@ -79,6 +79,7 @@ def test_every_row_is_the_run_of_its_parameters(folder):
         assert table["weight"][k] == pytest.approx(force / g, rel=1e-15)
     read = fd.load_table(folder / "t.nc")
     assert all(np.array_equal(read[name], table[name]) for name in ("g", "length", "angle", "force", "weight", "work"))
+    assert (list(read.parameters), list(read.outputs)) == (list(table.parameters), list(table.outputs))
     assert not journal_of(folder / "t.nc").exists()
     assert "12 runs" in repr(table)
 
@@ -217,6 +218,38 @@ def test_a_run_that_fails_is_a_row_with_its_message(folder):
     assert np.isfinite(table["angle"][[0, 2]]).all()
     with pytest.raises(ComputationError, match="no run has succeeded; the first says"):
         fd.sweep(fd.study(folder / "bar.toml", {"g": [1, 2]}, {"x": "hinge.torque: last"}), folder / "u.nc", workers=0)
+
+
+def test_an_output_that_a_run_has_not_leaves_the_others(folder):
+    """A formula without a value for one point, and an attribute that no run has."""
+    outputs = {
+        "angle": "hinge.angle: last",
+        "part": "= angle / (g - 2)",
+        "twice": "= 2 * part",
+        "x": "jumps: attribute",
+    }
+    table = fd.sweep(fd.study(folder / "bar.toml", {"g": [1.0, 2.0]}, outputs), folder / "t.nc", workers=0)
+    assert np.isfinite(table["angle"]).all()
+    assert np.isfinite(table["part"]).tolist() == np.isfinite(table["twice"]).tolist() == [True, False]
+    assert table["twice"][0] == -2 * table["angle"][0]
+    assert np.isnan(table["x"]).all()
+    assert table.messages[0].startswith("the result has no attribute 'jumps'")
+    assert "outputs.part: in the formula 'angle / (g - 2)'" in table.messages[1]
+    assert "outputs.twice" not in table.messages[1]
+    assert table.units["angle"] == "rad"
+
+
+def test_a_formula_of_an_item_that_a_run_has_not_is_nan(folder):
+    """As of a critical speed, which some runs have."""
+    outputs = {"rpm": "= 60 * speed", "speed": "projections.2: attribute", "angle": "hinge.angle: last"}
+    for attributes, expected in (([1.0, 2.0], 120.0), ([1.0], np.nan)):
+        result = Result(
+            np.zeros(1), {"hinge.angle": Quantity(np.ones(1), "rad")}, attributes={"projections": attributes}
+        )
+        found, why = values(tuple(measured(*one) for one in outputs.items()), result, {})
+        np.testing.assert_array_equal(found["rpm"], expected)
+        assert not why
+        assert found["angle"] == 1.0
 
 
 @pytest.mark.parametrize(("changed", "says"), [
@@ -478,8 +511,6 @@ def test_a_running_mean_has_the_standard_errors_of_its_runs():
 def test_measures_are_what_they_are_called(folder):
     scene, settings = fd.load_scene(folder / "bar.toml")
     result = fd.forward(scene, **settings.span, method=settings.method, check=True)
-    from ffr_dyn.studies.measures import values
-
     force = result["hinge.force"]
     expected = {
         "hinge.force.y: least": force[:, 1].min(), "hinge.force: greatest": force.max(),
@@ -489,21 +520,19 @@ def test_measures_are_what_they_are_called(folder):
         "hinge.angle: first": result["hinge.angle"][0], "hinge.force: error": result.attributes["errors"]["hinge.force"][0],
     }  # fmt: skip
     outputs = tuple(measured(f"o{k}", text) for k, text in enumerate(expected))
-    found = values(outputs, result, {})
+    found, _ = values(outputs, result, {})
     np.testing.assert_allclose(list(found.values()), list(expected.values()), rtol=1e-14)
 
 
 def test_means_are_over_the_time_however_rows_stand():
     """Of sin over a period and of t, with a last row soon after the one before, as where an event ends a run."""
-    from ffr_dyn.studies.measures import values
-
     time = np.append(np.linspace(0.0, 1.0, 41), 1.0 + 1e-9)
     wave, ramp = (Quantity(y, "m") for y in (np.sin(2 * np.pi * time), time))
     outputs = tuple(measured(text, text) for text in ("wave: mean", "wave: rms", "ramp: mean"))
-    found = values(outputs, Result(time, {"wave": wave, "ramp": ramp}), {})
+    found, _ = values(outputs, Result(time, {"wave": wave, "ramp": ramp}), {})
     np.testing.assert_allclose(list(found.values()), [0.0, 0.5**0.5, 0.5], atol=1e-8)
     at_speeds = Result(np.zeros(3), {"wave": Quantity(np.array([1.0, 2.0, 6.0]), "m")})
-    assert values(outputs[:1], at_speeds, {}) == {"wave: mean": 3.0}
+    assert values(outputs[:1], at_speeds, {}) == ({"wave: mean": 3.0}, [])
 
 
 STRIP = """
