@@ -15,10 +15,11 @@ from ffr_prep.common.errors import InputError
 from ffr_prep.common.units import bracketed, pretty
 
 LEVELS = 20
-LIKELY = 1.96  # standard errors of a mean that hold it with 95 % probability
+LIKELY = 0.95  # probability that a mean lies in its band
 MANY = 10.0  # histories, beyond which they are drawn fainter
 TICKS = 5  # of an axis, at most: numbers such as 0.0075 need their place
 SHORT = 12  # letters of a word under its box, which stands up if it is longer
+FIRST = 9  # means of a study, before which their bands need not be seen
 FEW = 12  # values of a parameter, up to which they are thought to be chosen, and drawn as lines
 
 
@@ -200,24 +201,35 @@ def _mean(path: Path, name: str, y: Array) -> Path:
     from ffr_dyn.pictures.histories import PALETTE, drawing
 
     number, mean, error = running_mean(y)
+    half = error * likely_errors(number)
     with drawing(path, (9.6, 3.8)) as figure:
         left, right = figure.subplots(1, 2)
         left.plot(number, mean, color=PALETTE[0], label="mean")
-        left.fill_between(
-            number, mean - LIKELY * error, mean + LIKELY * error, color=PALETTE[0], alpha=0.25, label="95 %"
-        )
+        left.fill_between(number, mean - half, mean + half, color=PALETTE[0], alpha=0.25, label="95 %")
+        shown = slice(min(FIRST, number.size) - 1, None)  # the band of the first few is wide
+        left.set_ylim(*_widened((mean - half)[shown].min(), (mean + half)[shown].max()))
         left.set(xlabel="runs", ylabel=name)
         left.legend()
         done = y[np.isfinite(y)]
-        right.hist(done, bins="auto", range=None if np.ptp(done) else _around(done[0]), color=PALETTE[1])
+        right.hist(done, bins="auto", range=None if np.ptp(done) else _widened(done[0], done[0]), color=PALETTE[1])
         right.set(xlabel=name, ylabel="runs")
         right.locator_params(axis="x", nbins=TICKS)
     return path
 
 
-def _around(value: float) -> tuple[float, float]:
-    """A range for the distribution of one value."""
-    return value - (0.05 * abs(value) or 1.0), value + (0.05 * abs(value) or 1.0)
+def _widened(least: float, most: float) -> tuple[float, float]:
+    """A range somewhat wider, of one value, too."""
+    more = 0.05 * ((most - least) or abs(least) or 1.0)
+    return least - more, most + more
+
+
+def likely_errors(number: Array) -> Array:
+    """Standard errors that hold the mean of so many normal numbers with the probability `LIKELY` (Student): 12.7 of two, 1.96
+    of many."""
+    from scipy.special import stdtrit
+
+    found: Array = stdtrit(number - 1.0, 0.5 + 0.5 * LIKELY)
+    return found
 
 
 def running_mean(y: Array) -> tuple[Array, Array, Array]:
@@ -241,7 +253,7 @@ def _pairs(path: Path, columns: dict[str, Array]) -> Path:
                 axes = grid[i][j]
                 if i == j:
                     done = columns[along][np.isfinite(columns[along])]
-                    same = _around(done[0]) if done.size and not np.ptp(done) else None
+                    same = _widened(done[0], done[0]) if done.size and not np.ptp(done) else None
                     axes.hist(done, bins=20, range=same, color=PALETTE[1])
                 else:
                     axes.plot(columns[along], columns[below], ".", color=PALETTE[0], markersize=2)

@@ -117,7 +117,7 @@ def values(
             except InputError as error:
                 why.append(str(error))
         lost |= {name} - found.keys()
-    times = {TIME: result.time.tolist()} if any(one.how == HISTORY for one in outputs) else {}
+    times = {TIME: result.time.tolist()} if any(isinstance(value, list) for value in found.values()) else {}
     return {one.name: found[one.name] for one in outputs if one.name in found} | times, why
 
 

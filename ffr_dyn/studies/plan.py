@@ -134,6 +134,10 @@ def load_study(path: str | Path) -> Study:
     """
     path = Path(path)
     tree = read_toml(path, "a study file")
+    if "scene" not in tree and {"bodies", "ground"} <= tree.keys():
+        raise InputError(
+            f"{path} is no study but a scene, which `ffr-dyn run` analyses; a study names it: scene = {path.name!r}"
+        )
     try:
         entry = StudyFile.model_validate(tree)
     except ValidationError as error:

@@ -261,7 +261,7 @@ def load_table(path: str | Path) -> Table:
 
 
 def _read(path: Path) -> Table:
-    with h5py.File(path, "r", locking=False) as file:
+    with h5py.File(path, "r") as file:
         if SECTION not in file.attrs:
             raise InputError(f"{path} is not the table of a study; ffr-dyn sweep writes one")
         if file.attrs[SECTION] != FORMAT:

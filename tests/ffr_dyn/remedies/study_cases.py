@@ -168,6 +168,7 @@ CASES = [
     Case(p(drawn, ["a", "a", "a"], "angle"), p(drawn, NUMBERS, "angle")),
     Case(asked({"length": {"beta": ["1 m", 2, "1 m", "1 m"]}}, samples=2),
          asked({"length": {"beta": [1, 2, "1 m", "1 m"]}}, samples=2)),
+    Case(p(inside, fd.load_study, "bar.toml"), p(inside, fd.load_scene, "bar.toml")),
     Case(p(_check, Full("writing t.nc.runs/run-000001.nc failed")), p(_check, [])),
     Case(p(_check, Lost("the task was lost: the cluster has gone")), p(_check, [])),
 ]  # fmt: skip

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from ffr_dyn.pictures import histories
-from ffr_dyn.studies.draw import plot_study, tornado
+from ffr_dyn.studies.draw import likely_errors, plot_study, running_mean, tornado
 from ffr_dyn.studies.table import Table
 
 X = np.linspace(0.0, 1.0, 6)
@@ -66,3 +66,12 @@ def test_rows_without_a_time_are_drawn_over_their_numbers(drawn):
     assert axes.get_xlabel() == "row"
     assert len(axes.collections[0].get_segments()) == 6
     assert axes.get_xlim()[1] > 3.9
+
+
+@pytest.mark.parametrize("count", [2, 3, 5, 20])
+def test_the_mean_lies_in_its_band_nineteen_times_of_twenty(count):
+    """However few runs there are: of two, the normal quantile would hold seven of ten."""
+    samples = np.random.default_rng(1).normal(3.0, 2.0, (4000, count))
+    ends = [running_mean(y) for y in samples]
+    inside = [abs(mean[-1] - 3.0) < error[-1] * likely_errors(number)[-1] for number, mean, error in ends]
+    assert np.mean(inside) == pytest.approx(0.95, abs=0.012)

@@ -91,6 +91,13 @@ def test_the_file_has_dimensions_and_coordinates(folder):
         assert file["force"].attrs["coordinates"] == "g length"
 
 
+def test_a_table_that_xarray_has_open_is_read(folder):
+    xarray = pytest.importorskip("xarray")
+    fd.sweep(fd.study(folder / "bar.toml", {"g": [1.0]}, {"angle": "hinge.angle: last"}), folder / "t.nc", workers=0)
+    with xarray.open_dataset(folder / "t.nc") as opened:
+        assert opened["angle"][0] == fd.load_table(folder / "t.nc")["angle"][0]
+
+
 @pytest.mark.slow
 def test_whole_histories_are_rows_of_a_dimension_of_their_own(folder, monkeypatch):
     """Of runs of unequal length, too; the table is the same when it is made by workers."""
