@@ -15,7 +15,7 @@ from ffr_dyn.scene_file.assignments import assigned
 from ffr_dyn.scene_file.parameters import Parameters, flattened, substituted
 from ffr_dyn.scene_file.source import PATHS, read_source
 from ffr_dyn.studies.measures import mentions
-from ffr_dyn.studies.plan import Study, as_texts, recipe
+from ffr_dyn.studies.plan import Study, as_texts, reached, recipe
 from ffr_dyn.studies.sampling import Value
 from ffr_prep.common.entries import places_of, value_at
 from ffr_prep.common.errors import InputError
@@ -108,12 +108,9 @@ def _files_of_scene(made: Study) -> Iterator[Path]:
 
 def _naming(made: Study, tree: Mapping[str, Any]) -> list[str]:
     """The parameters of a study that the name of a file depends on, be it by way of others."""
-    own, paths = flattened(tree.get("parameters", {})), _paths(tree)
-    texts, found = [text for _, text in paths], {place for place, _ in paths}
-    while more := {name for name in own if name not in found and any(mentions(text, name) for text in texts)}:
-        found |= more
-        texts += [str(own[name]) for name in more]
-    return [name for name in made.parameters if name in found]
+    paths = _paths(tree)
+    own = reached([text for _, text in paths], flattened(tree.get("parameters", {})))
+    return [name for name in made.parameters if name in own or name in dict(paths)]
 
 
 def _paths(tree: Mapping[str, Any]) -> list[tuple[str, str]]:

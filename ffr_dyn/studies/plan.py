@@ -178,8 +178,11 @@ def study(
         raise InputError("parameters: there are none; name at least one with its values, such as load = [10, 50]")
     if not outputs:
         raise InputError('outputs: there are none; name at least one, such as force = "pin.force: largest"')
-    known = _known(Path(scene), bodies.values())
-    found = {name: _values(name, given) for name, given in _leaves(parameters, known)}
+    leaves = list(_leaves(parameters, _known(Path(scene), bodies.values())))
+    found = {name: _values(name, given) for name, given in leaves}
+    if len(found) < len(leaves):
+        twice = next(name for k, (name, _) in enumerate(leaves) if name in dict(leaves[:k]))
+        raise InputError(f"parameters.{twice}: it is given twice, with quotes and without; give its values once")
     _check_settings(found, points_are, samples, sampling, seed)
     made = Study(
         Path(scene),
@@ -333,14 +336,15 @@ def units_of(made: Study) -> dict[str, str]:
 
 def _check(made: Study) -> None:
     tree = read_source(made.scene).tree
-    own, places, texts = flattened(tree.get("parameters", {})), places_of(tree), list(_texts(tree))
+    own, places = flattened(tree.get("parameters", {})), places_of(tree)
+    used = reached(_texts({key: item for key, item in tree.items() if key != "parameters"}), own)
     for name in made.parameters:
         if re.fullmatch(r"[A-Za-z_]\w*(\.\w+)*", name) is None:
             raise InputError(f"parameters.{name}: use letters, digits, '_' and dots in its name")
         in_bodies = any(mentions(line, name) for line in made.recipes.values())
         if not in_bodies and name not in own and name not in places:
             raise InputError(f"in {made.scene} and in lines that make bodies {unknown(name, own, places)}")
-        if not in_bodies and name in own and not any(mentions(text, name) for text in texts):
+        if not in_bodies and name in own and name not in used:
             raise InputError(f"the parameter {name!r} changes nothing: nothing in {made.scene} uses it; leave it out")
     _check_overlap(made.parameters)
     _check_names(made)
@@ -400,6 +404,15 @@ def _check_bodies(made: Study) -> None:
                 f"bodies.{name}: {line!r}: begin with a command of ffr-prep that makes a body: {', '.join(MAKING)}"
             )
         substituted(line, made.points[0], f"bodies.{name}.make")
+
+
+def reached(texts: Iterable[str], own: Mapping[str, Any]) -> frozenset[str]:
+    """The parameters of a scene that texts depend on, be it by way of others."""
+    texts, found = list(texts), frozenset[str]()
+    while more := {name for name in own if name not in found and any(mentions(text, name) for text in texts)}:
+        found |= more
+        texts = [str(own[name]) for name in more]
+    return found
 
 
 def _texts(tree: Any, where: tuple[str, ...] = ()) -> Iterator[str]:

@@ -169,6 +169,7 @@ CASES = [
     Case(asked({"length": {"beta": ["1 m", 2, "1 m", "1 m"]}}, samples=2),
          asked({"length": {"beta": [1, 2, "1 m", "1 m"]}}, samples=2)),
     Case(p(inside, fd.load_study, "bar.toml"), p(inside, fd.load_scene, "bar.toml")),
+    Case(asked({"bodies": {"bar": {"mass": [1]}}, "bodies.bar.mass": [1]}), asked({"bodies.bar.mass": [1]})),
     Case(p(_check, Full("writing t.nc.runs/run-000001.nc failed")), p(_check, [])),
     Case(p(_check, Lost("the task was lost: the cluster has gone")), p(_check, [])),
 ]  # fmt: skip

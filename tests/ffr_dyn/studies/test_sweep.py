@@ -359,6 +359,16 @@ def test_names_with_dots_may_be_tables(folder, parameters):
     assert made.points == ({"bodies.bar.mass": 1.0, "gravity.2": -9.81}, {"bodies.bar.mass": 2.0, "gravity.2": -9.81})
 
 
+def test_a_parameter_that_only_another_one_without_use_has_changes_nothing(folder):
+    text = SCENE.replace("idle = 3.0", 'idle = 3.0\nlazy = "2 * idle"\nhalf = 0.5').replace(
+        "length = 1.0", 'length = "2 * half"'
+    )
+    (folder / "bar.toml").write_text(text)
+    with pytest.raises(InputError, match="'idle' changes nothing"):
+        fd.study(folder / "bar.toml", {"idle": [1, 2]}, {"angle": "hinge.angle: last"})
+    assert len(fd.study(folder / "bar.toml", {"half": [1, 2]}, {"angle": "hinge.angle: last"}).points) == 2
+
+
 def test_switches_are_what_a_scene_file_has(folder):
     scene = (folder / "bar.toml").read_text().replace("step = 1e-3", "step = 1e-3\ncheck = true")
     (folder / "bar.toml").write_text(scene)
