@@ -20,6 +20,7 @@ from typing import Any, Self
 import h5py
 import numpy as np
 
+from ffr_dyn.results.file import STUDY
 from ffr_dyn.studies.identity import mark
 from ffr_dyn.studies.measures import HISTORY, TIME, Number
 from ffr_dyn.studies.plan import Study, units_of
@@ -36,7 +37,7 @@ from ffr_prep.common.units import in_words as dimension_in_words
 
 RUN, ROW = "run", "row"
 MESSAGE, NOTES = "message", "notes"
-SECTION, FORMAT = "ffr_study", 1
+FORMAT = 1
 
 
 @dataclass(frozen=True, repr=False)
@@ -228,7 +229,7 @@ def save_table(made: Table, path: str | Path) -> None:
     """Write a table (netCDF-4), whole or not at all."""
     texts = {MESSAGE: list(made.messages), NOTES: list(made.notes or [""] * len(made))}
     with replacing(path) as part, new_file(part) as file:
-        file.attrs[SECTION] = FORMAT
+        file.attrs[STUDY] = FORMAT
         _variable(file, RUN, np.arange(len(made), dtype=np.int64)).make_scale(RUN)
         if TIME in made.outputs:
             _variable(file, ROW, np.arange(made.outputs[TIME].shape[1], dtype=np.int64)).make_scale(ROW)
@@ -262,11 +263,11 @@ def load_table(path: str | Path) -> Table:
 
 def _read(path: Path) -> Table:
     with h5py.File(path, "r") as file:
-        if SECTION not in file.attrs:
+        if STUDY not in file.attrs:
             raise InputError(f"{path} is not the table of a study; ffr-dyn sweep writes one")
-        if file.attrs[SECTION] != FORMAT:
+        if file.attrs[STUDY] != FORMAT:
             raise InputError(
-                f"{path} is a table of format {file.attrs[SECTION]}, and this version reads format {FORMAT}: use the version "
+                f"{path} is a table of format {file.attrs[STUDY]}, and this version reads format {FORMAT}: use the version "
                 "that wrote it, or sweep again"
             )
         found = {name: _values(data) for name, data in file.items() if name not in (RUN, ROW, MESSAGE, NOTES)}

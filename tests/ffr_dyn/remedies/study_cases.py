@@ -72,13 +72,13 @@ def at_rest(output: str) -> object:
     return inside(sweep)
 
 
-def read(*, study: bool, of_format: int = FORMAT) -> object:
-    def load() -> Table:
+def read(*, study: bool, of_format: int = FORMAT, by: Callable[[str], object] = load_table) -> object:
+    def load() -> object:
         scene, settings = fd.load_scene("bar.toml")
         fd.forward(scene, **settings.span, method=settings.method, check=False, path="run.nc")
         with patch("ffr_dyn.studies.table.FORMAT", of_format):
             fd.sweep(fd.study("bar.toml", G, ANGLE), "table.nc", workers=0)
-        return load_table("table.nc" if study else "run.nc")
+        return by("table.nc" if study else "run.nc")
 
     return inside(load)
 
@@ -170,6 +170,7 @@ CASES = [
          asked({"length": {"beta": [1, 2, "1 m", "1 m"]}}, samples=2)),
     Case(p(inside, fd.load_study, "bar.toml"), p(inside, fd.load_scene, "bar.toml")),
     Case(asked({"bodies": {"bar": {"mass": [1]}}, "bodies.bar.mass": [1]}), asked({"bodies.bar.mass": [1]})),
+    Case(p(read, study=True, by=fd.load_result), p(read, study=False, by=fd.load_result)),
     Case(p(_check, Full("writing t.nc.runs/run-000001.nc failed")), p(_check, [])),
     Case(p(_check, Lost("the task was lost: the cluster has gone")), p(_check, [])),
 ]  # fmt: skip
