@@ -42,6 +42,7 @@ from ffr_dyn.scene.scene import Scene
 from ffr_prep.body import BodyError
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError, InputError
+from ffr_prep.common.registry import load_plugin, plugins
 
 Item = TypeVar("Item")
 
@@ -239,6 +240,8 @@ class Distributed:
         """See `Pool`."""
         from dask.distributed import as_completed
 
+        if files := plugins():
+            self._client.register_plugin(_loading(files))
         futures = {
             self._client.submit(_by_itself, function, item, retries=RETRIES, pure=False): k
             for k, item in enumerate(items)
@@ -256,6 +259,20 @@ def _by_itself(function: Callable[[Item], Any], item: Item) -> Any:
     """The result of the function for an item, with no threads: other workers take the other processors."""
     with alone():
         return function(item)
+
+
+def _loading(files: Sequence[str]) -> Any:
+    """What has workers of a cluster load the plugins that are loaded here, before they do anything."""
+    from dask.distributed import WorkerPlugin
+
+    class Loading(WorkerPlugin):  # type: ignore[misc]
+        name = "plugins of ffr"
+
+        def setup(self, worker: Any) -> None:
+            for file in files:
+                load_plugin(file)
+
+    return Loading()
 
 
 def _why(error: BaseException) -> str:
