@@ -58,7 +58,7 @@ def forward_many(
     scenes = several("scenes", scenes, (Scene,))
     check_output_step(output_step)
     check_method(method)
-    if threads is not None and threads < 1:
+    if threads is not None and (type(threads) is not int or threads < 1):
         raise InputError(f"there cannot be {threads} threads; give how many runs may go on at the same time, 1 or more")
     if paths is not None and len(set(map(str, paths))) != len(scenes):
         raise InputError(

@@ -14,6 +14,7 @@ others.
 from __future__ import annotations
 
 import fnmatch
+import logging
 import re
 import statistics
 import time
@@ -41,6 +42,7 @@ from ffr_dyn.scene.scene import Scene
 from ffr_prep.body import BodyError
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError, InputError
+from ffr_prep.common.registry import load_plugin, plugins
 
 Item = TypeVar("Item")
 
@@ -108,6 +110,11 @@ class Failure:
     """Why a variant has no outcome."""
 
     reason: str
+
+
+@dataclass(frozen=True)
+class Lost(Failure):
+    """Nobody is left who could try it."""
 
 
 # ---- one run ------------------------------------------------------------------------------------------------------
@@ -233,6 +240,8 @@ class Distributed:
         """See `Pool`."""
         from dask.distributed import as_completed
 
+        if files := plugins():
+            self._client.register_plugin(_loading(files))
         futures = {
             self._client.submit(_by_itself, function, item, retries=RETRIES, pure=False): k
             for k, item in enumerate(items)
@@ -240,8 +249,10 @@ class Distributed:
         for future in as_completed(list(futures), loop=self._client.loop):  # type: ignore[no-untyped-call]
             if future.status == "finished":
                 yield futures[future], future.result()
+            elif future.status == "error":
+                yield futures[future], Failure(_why(future.exception()))
             else:
-                yield futures[future], Failure(_why(future))
+                yield futures[future], Lost(f"the task was {future.status}: the cluster has gone")
 
 
 def _by_itself(function: Callable[[Item], Any], item: Item) -> Any:
@@ -250,10 +261,21 @@ def _by_itself(function: Callable[[Item], Any], item: Item) -> Any:
         return function(item)
 
 
-def _why(future: Any) -> str:
-    if future.status != "error":
-        return f"the task was {future.status}: the cluster has gone"
-    error = future.exception()
+def _loading(files: Sequence[str]) -> Any:
+    """What has workers of a cluster load the plugins that are loaded here, before they do anything."""
+    from dask.distributed import WorkerPlugin
+
+    class Loading(WorkerPlugin):  # type: ignore[misc]
+        name = "plugins of ffr"
+
+        def setup(self, worker: Any) -> None:
+            for file in files:
+                load_plugin(file)
+
+    return Loading()
+
+
+def _why(error: BaseException) -> str:
     if type(error).__name__ == "KilledWorker":
         return f"its worker died {RETRIES + 1} times: out of memory, or killed from outside"
     return f"{type(error).__name__}: {error}"
@@ -301,6 +323,7 @@ def _client(workers: int | None, cluster: str | None) -> Iterator[Any]:
             'running variants in parallel needs Dask: pip install "ffr[chart]"; --workers 0 runs them here, one by one'
         ) from None
     quiet = {"distributed.scheduler.allowed-failures": RETRIES, "logging.distributed": "critical"}
+    logging.getLogger("distributed.client").setLevel(logging.CRITICAL)  # which has read its configuration already
     with dask.config.set(quiet):
         if cluster is None:
             count = default_workers() if workers is None else workers

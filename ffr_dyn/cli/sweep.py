@@ -8,6 +8,7 @@ import click
 
 from ffr_prep.common.command import INPUT_FILE, OUTPUT_FILE, check_ending
 
+MOST_NOTES = 5  # that are printed; the table has those of every run
 NOTES = """\b
 A study file:
   scene = "crank.toml"
@@ -53,6 +54,7 @@ def sweep(
     from ffr_dyn.studies.draw import plot_study
     from ffr_dyn.studies.plan import load_study
     from ffr_dyn.studies.sweep import sweep as run_all
+    from ffr_dyn.studies.table import noted
 
     made, output = load_study(study), output or study.with_suffix(".nc")
     check_ending("-o", output, ".nc")
@@ -61,6 +63,8 @@ def sweep(
     click.echo(repr(table))
     for number in table.failed[:3]:
         click.echo(f"failed       run {number}: {table.messages[number]}")
+    for count, note in noted(table)[:MOST_NOTES]:
+        click.echo(f"note         of {count} runs: {note}")
     click.echo(f"table        {output}")
     for picture in plot_study(table, plots) if plots is not None else ():
         click.echo(f"picture      {picture}")

@@ -45,6 +45,7 @@ from ffr_prep.common.reading import nearest_file, not_of_its_ending
 
 FORMAT = "ffr-result"
 FORMAT_VERSION = 1
+STUDY = "ffr_study"  # what marks the table of a study
 
 _SURFACE = ("points", "triangles", "Phi", "stress", "moduli", "beams/positions", "beams/axes", "beams/modes")
 _SECOND = ("second", "second_stress", "beams/second")
@@ -547,6 +548,11 @@ def program() -> str:
 
 def _check_format(path: Path, file: h5py.File) -> None:
     if file.attrs.get("ffr_format") != FORMAT:
+        if STUDY in file.attrs:
+            raise InputError(
+                f"{path} is the table of a study, not a result file; read it by fd.load_table or xarray, or draw it by "
+                "fd.plot_study"
+            )
         raise InputError(f"{path} is not a result file (foreign header); write one with ffr-dyn")
     if file.attrs["ffr_format_version"] > FORMAT_VERSION:
         raise InputError(

@@ -13,7 +13,7 @@ from ffr_dyn.functions.quantities import WithUnit, with_unit
 from ffr_prep.common.errors import InputError
 from ffr_prep.common.units import split_quantity, to_si
 
-_REFERENCE = re.compile(r"\$\{\s*([^{}]*?)\s*\}")
+PLACEHOLDER = re.compile(r"\$\{\s*([^{}]*?)\s*\}")
 NAME = re.compile(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)*")  # of a parameter
 
 
@@ -44,12 +44,15 @@ class Parameters(Mapping[str, Any]):
 
     def __getitem__(self, name: str) -> Any:
         if name not in self._found:
+            given = self._given[name]
             if name in self._open:
                 circle = " -> ".join([*self._open[self._open.index(name) :], name])
                 raise InputError(f"parameters.{name}: depends on itself: {circle}")
             self._open.append(name)
-            self._found[name] = self._value(name, self._given[name])
-            self._open.pop()
+            try:
+                self._found[name] = self._value(name, given)
+            finally:
+                self._open.pop()
         return self._found[name]
 
     def __iter__(self) -> Iterator[str]:
@@ -93,8 +96,8 @@ def substituted(value: Any, parameters: Mapping[str, Any], where: str) -> Any:
             raise InputError(f"{where}: there is no parameter {name!r}; {nearest(name, parameters)}")
         return parameters[name]
 
-    whole = _REFERENCE.fullmatch(value.strip())
-    return of(whole[1]) if whole else _REFERENCE.sub(lambda found: str(of(found[1])), value)
+    whole = PLACEHOLDER.fullmatch(value.strip())
+    return of(whole[1]) if whole else PLACEHOLDER.sub(lambda found: str(of(found[1])), value)
 
 
 def as_number(text: str, parameters: Mapping[str, Any], what: str, unit: str | None = None) -> float:

@@ -15,9 +15,11 @@ from ffr_prep.common.errors import InputError
 from ffr_prep.common.units import bracketed, pretty
 
 LEVELS = 20
-LIKELY = 1.96  # standard errors of a mean that hold it with 95 % probability
+LIKELY = 0.95  # probability that a mean lies in its band
 MANY = 10.0  # histories, beyond which they are drawn fainter
 TICKS = 5  # of an axis, at most: numbers such as 0.0075 need their place
+SHORT = 12  # letters of a word under its box, which stands up if it is longer
+FIRST = 9  # means of a study, before which their bands need not be seen
 FEW = 12  # values of a parameter, up to which they are thought to be chosen, and drawn as lines
 
 
@@ -25,14 +27,15 @@ def plot_study(table: Table, folder: str | Path, outputs: Sequence[str] = ()) ->
     """Draw outputs (default: all) of a study as PNG files in a folder; returns their paths.
 
         <output>.png           over every parameter
-        <output>-surface.png   over the two parameters that it changes with most, where there are two
+        <output>-surface.png   over the two parameters that it changes with most, where there are two and it changes
         <output>-tornado.png   by how much every parameter changes it, from its least to its greatest value
         <output>-mean.png      its mean over the first runs with 95 % confidence, and its distribution
         pairs.png              all parameters and outputs against each other
 
     Of a history <output>.png has the rows of all runs, in the colour of the parameter that changes their mean most.
 
-    The tornado is that of a linear fit; R^2 in its title says how linear the output is. Raises InputError for unknown names.
+    The tornado is that of a linear fit; R^2 in its title says how linear the output is. Parameters that are texts have boxes
+    in <output>.png alone. Raises InputError for unknown names, and where no parameter has several values.
 
     >>> fd.plot_study(fd.load_table("study.nc"), "pictures")
     """
@@ -40,18 +43,19 @@ def plot_study(table: Table, folder: str | Path, outputs: Sequence[str] = ()) ->
     for name in names:
         if name not in table.outputs:
             raise InputError(f"the table has no output {name!r}; there are {', '.join(table.outputs)}")
-    varied = {name: values for name, values in _numbers(table).items() if np.ptp(values) > 0}
-    if not varied:
-        raise InputError("no parameter of the study has several values that are numbers: there is nothing to draw over")
+    several = {name: values for name, values in table.parameters.items() if len(set(values)) > 1}
+    if not several:
+        raise InputError("no parameter of the study has several values: there is nothing to draw over")
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    return list(_drawn(table, names, varied, folder))
+    return list(_drawn(table, names, several, folder))
 
 
-def _drawn(table: Table, names: list[str], varied: dict[str, Array], folder: Path) -> Iterator[Path]:
+def _drawn(table: Table, names: list[str], several: dict[str, Any], folder: Path) -> Iterator[Path]:
     numbers = [name for name in names if table.outputs[name].ndim == 1]
-    label = {name: bracketed(name, pretty(table.units.get(name, ""))) for name in (*varied, *table.outputs)}
-    varied = {label[name]: values for name, values in varied.items()}
+    label = {name: bracketed(name, pretty(table.units.get(name, ""))) for name in (*several, *table.outputs)}
+    varied = {label[name]: values for name, values in several.items() if isinstance(values, np.ndarray)}
+    texts = {name: np.array(values) for name, values in several.items() if label[name] not in varied}
     for name in names:
         if name not in numbers and name != TIME and np.isfinite(table.outputs[name]).any():
             yield _histories(folder / f"{name}.png", label[name], table.outputs[TIME], table.outputs[name], varied)
@@ -60,30 +64,34 @@ def _drawn(table: Table, names: list[str], varied: dict[str, Array], folder: Pat
         y, x = table.outputs[name][done], {key: values[done] for key, values in varied.items()}
         if y.size < 2:
             continue
-        changes, share = tornado(x, y)
-        yield _over_parameters(folder / f"{name}.png", label[name], x, y)
-        yield _tornado(folder / f"{name}-tornado.png", label[name], changes, share)
+        words = {key: values[done] for key, values in texts.items()}
+        yield _over_parameters(folder / f"{name}.png", label[name], x, words, y)
         yield _mean(folder / f"{name}-mean.png", label[name], table.outputs[name])
+        if x:
+            yield _tornado(folder / f"{name}-tornado.png", label[name], x, y)
         if len(x) > 1:
             first, second = changing_most(x, y)[:2]
-            if _spans(x[first], x[second]):
+            if np.ptp(y) and _spans(x[first], x[second]):
                 yield _surface(folder / f"{name}-surface.png", label[name], (first, x[first]), (second, x[second]), y)
-    yield _pairs(folder / "pairs.png", {**varied, **{label[name]: table.outputs[name] for name in numbers}})
-
-
-def _numbers(table: Table) -> dict[str, Array]:
-    return {name: values for name, values in table.parameters.items() if isinstance(values, np.ndarray)}
+    columns = {**varied, **{label[name]: table.outputs[name] for name in numbers}}
+    if len(columns) > 1:
+        yield _pairs(folder / "pairs.png", columns)
 
 
 def tornado(parameters: dict[str, Array], y: Array) -> tuple[dict[str, float], float]:
     """(by how much a linear fit changes from the least to the greatest value of every parameter, R^2 of the fit)."""
-    span = {name: float(np.ptp(values)) for name, values in parameters.items()}
-    columns = [(values - values.mean()) / (span[name] or 1.0) for name, values in parameters.items()]
-    A = np.column_stack([np.ones(y.size), *columns])
-    fit = np.linalg.lstsq(A, y, rcond=None)[0]
-    spread = float(((y - y.mean()) ** 2).sum())
-    share = 1.0 - float(((y - A @ fit) ** 2).sum()) / spread if spread > 0 else 1.0
+    centred = y - y.mean() if np.ptp(y) else np.zeros(y.size)  # the mean of equal numbers may be another, by rounding
+    A = _fitted(parameters)
+    fit = np.linalg.lstsq(A, centred, rcond=None)[0]
+    spread = float((centred**2).sum())
+    share = 1.0 - float(((centred - A @ fit) ** 2).sum()) / spread if spread > 0 else 1.0
     return dict(zip(parameters, fit[1:].tolist(), strict=True)), share
+
+
+def _fitted(parameters: dict[str, Array]) -> Array:
+    """(runs, 1 + parameters) matrix of a linear fit, of parameters that go from 0 to 1."""
+    columns = [(values - values.mean()) / (float(np.ptp(values)) or 1.0) for values in parameters.values()]
+    return np.column_stack([np.ones(columns[0].size), *columns])
 
 
 def changing_most(parameters: dict[str, Array], y: Array) -> list[str]:
@@ -111,53 +119,66 @@ def _histories(path: Path, name: str, time: Array, y: Array, varied: dict[str, A
 
     from ffr_dyn.pictures.histories import drawing
 
-    done = np.isfinite(y[:, 0])
+    done = np.isfinite(y).any(axis=1)
     time, y, x = time[done], y[done], {key: values[done] for key, values in varied.items()}
-    key = changing_most(x, np.nanmean(y, axis=1))[0]
+    key = changing_most(x, np.nanmean(y, axis=1))[0] if x else ""
+    along, of = (time, "time [s]") if np.nanmax(time) > np.nanmin(time) else (_row_numbers(y), "row")
     with drawing(path, (8.0, 4.0)) as figure:
         axes = figure.subplots()
         lines = LineCollection(
-            list(np.stack([time, y], axis=-1)), array=x[key], lw=0.8, alpha=min(1.0, MANY / max(len(y), 1))
+            list(np.stack([along, y], axis=-1)), array=x.get(key), lw=0.8, alpha=min(1.0, MANY / max(len(y), 1))
         )
         axes.add_collection(lines)
         axes.autoscale()
-        figure.colorbar(ScalarMappable(lines.norm, lines.cmap), ax=axes, label=key)  # not as faint as the lines
-        axes.set(xlabel="time [s]", ylabel=name)
+        if key:
+            figure.colorbar(ScalarMappable(lines.norm, lines.cmap), ax=axes, label=key)  # not as faint as the lines
+        axes.set(xlabel=of, ylabel=name)
     return path
 
 
-def _over_parameters(path: Path, name: str, x: dict[str, Array], y: Array) -> Path:
+def _row_numbers(y: Array) -> Array:
+    """Of analyses that are of one moment, such as one over speeds or frequencies."""
+    found: Array = np.broadcast_to(np.arange(1.0, y.shape[1] + 1.0), y.shape)
+    return found
+
+
+def _over_parameters(path: Path, name: str, x: dict[str, Array], words: dict[str, Any], y: Array) -> Path:
     from ffr_dyn.pictures.histories import PALETTE, drawing
 
-    with drawing(path, (4.4 * len(x), 3.8)) as figure:
-        for axes, (key, values) in zip(
-            figure.subplots(1, len(x), squeeze=False, sharey=True)[0], x.items(), strict=True
-        ):
+    with drawing(path, (4.4 * len(x | words), 3.8)) as figure:
+        all_axes = figure.subplots(1, len(x | words), squeeze=False, sharey=True)[0]
+        for axes, (key, values) in zip(all_axes, (x | words).items(), strict=True):
             chosen = np.unique(values)
-            if chosen.size <= FEW:
-                axes.boxplot(
-                    [y[values == one] for one in chosen],
-                    positions=chosen,
-                    widths=0.06 * np.ptp(chosen),
-                    manage_ticks=False,
-                )
+            if chosen.size <= FEW or key in words:
+                at = chosen if key in x else np.arange(float(chosen.size))
+                boxes = [y[values == one] for one in chosen]
+                axes.boxplot(boxes, positions=at, widths=0.06 * (np.ptp(at) or 1.0), manage_ticks=False)
             else:
                 axes.plot(values, y, ".", color=PALETTE[0], markersize=3)
             axes.set_xlabel(key)
-            axes.locator_params(axis="x", nbins=TICKS)
+            if key in x:
+                axes.locator_params(axis="x", nbins=TICKS)
+            else:
+                axes.set_xticks(at, chosen, rotation=0 if max(map(len, chosen)) < SHORT else 90)
         figure.supylabel(name)
     return path
 
 
-def _tornado(path: Path, name: str, changes: dict[str, float], share: float) -> Path:
+def _tornado(path: Path, name: str, x: dict[str, Array], y: Array) -> Path:
     from ffr_dyn.pictures.histories import PALETTE, drawing
 
+    changes, share = tornado(x, y)
     keys = sorted(changes, key=lambda key: abs(changes[key]))
+    shared = np.linalg.matrix_rank(_fitted(x)) < 1 + len(x)
+    title = f"linear fit of {y.size} runs, R² = {share:.3f}" if np.ptp(y) else f"{name} is equal in all {y.size} runs"
     with drawing(path, (6.4, 1.6 + 0.4 * len(keys))) as figure:
         axes = figure.subplots()
         axes.barh(keys, [changes[key] for key in keys], color=[PALETTE[changes[key] < 0] for key in keys])
         axes.axvline(0.0, color="0.3", lw=0.8)
-        axes.set(title=f"linear fit, R² = {share:.3f}", xlabel=f"change of {name}, least to greatest value")
+        axes.set(title=title, xlabel=f"change of {name}, least to greatest value")
+        axes.locator_params(axis="x", nbins=TICKS)
+        if shared:
+            axes.set_title(f"{title}\nparameters vary together: the fit cannot tell them apart")
     return path
 
 
@@ -180,17 +201,35 @@ def _mean(path: Path, name: str, y: Array) -> Path:
     from ffr_dyn.pictures.histories import PALETTE, drawing
 
     number, mean, error = running_mean(y)
+    half = error * likely_errors(number)
     with drawing(path, (9.6, 3.8)) as figure:
         left, right = figure.subplots(1, 2)
         left.plot(number, mean, color=PALETTE[0], label="mean")
-        left.fill_between(
-            number, mean - LIKELY * error, mean + LIKELY * error, color=PALETTE[0], alpha=0.25, label="95 %"
-        )
+        left.fill_between(number, mean - half, mean + half, color=PALETTE[0], alpha=0.25, label="95 %")
+        shown = slice(min(FIRST, number.size) - 1, None)  # the band of the first few is wide
+        left.set_ylim(*_widened((mean - half)[shown].min(), (mean + half)[shown].max()))
         left.set(xlabel="runs", ylabel=name)
         left.legend()
-        right.hist(y[np.isfinite(y)], bins="auto", color=PALETTE[1])
+        done = y[np.isfinite(y)]
+        right.hist(done, bins="auto", range=None if np.ptp(done) else _widened(done[0], done[0]), color=PALETTE[1])
         right.set(xlabel=name, ylabel="runs")
+        right.locator_params(axis="x", nbins=TICKS)
     return path
+
+
+def _widened(least: float, most: float) -> tuple[float, float]:
+    """A range somewhat wider, of one value, too."""
+    more = 0.05 * ((most - least) or abs(least) or 1.0)
+    return least - more, most + more
+
+
+def likely_errors(number: Array) -> Array:
+    """Standard errors that hold the mean of so many normal numbers with the probability `LIKELY` (Student): 12.7 of two, 1.96
+    of many."""
+    from scipy.special import stdtrit
+
+    found: Array = stdtrit(number - 1.0, 0.5 + 0.5 * LIKELY)
+    return found
 
 
 def running_mean(y: Array) -> tuple[Array, Array, Array]:
@@ -213,10 +252,13 @@ def _pairs(path: Path, columns: dict[str, Array]) -> Path:
             for j, along in enumerate(names):
                 axes = grid[i][j]
                 if i == j:
-                    axes.hist(columns[along][np.isfinite(columns[along])], bins=20, color=PALETTE[1])
+                    done = columns[along][np.isfinite(columns[along])]
+                    same = _widened(done[0], done[0]) if done.size and not np.ptp(done) else None
+                    axes.hist(done, bins=20, range=same, color=PALETTE[1])
                 else:
                     axes.plot(columns[along], columns[below], ".", color=PALETTE[0], markersize=2)
                 axes.tick_params(labelsize=6)
+                axes.locator_params(nbins=TICKS)
                 axes.set_xlabel(along if i == count - 1 else "", fontsize=8)
                 axes.set_ylabel(below if j == 0 else "", fontsize=8)
     return path

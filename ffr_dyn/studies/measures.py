@@ -12,8 +12,9 @@
 
 from __future__ import annotations
 
+import math
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -93,23 +94,50 @@ def wanted(outputs: tuple[Measured, ...]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(names))
 
 
-def values(outputs: tuple[Measured, ...], result: Result, parameters: Mapping[str, float | str]) -> dict[str, Number]:
-    """The numbers of a run, by name; of histories all rows, and their times [s]. Raises InputError for quantities that the
-    result has not."""
-    found: dict[str, Number] = {one.name: _value(one, result) for one in outputs if one.how != "="}
-    formulas = {one.name: one.quantity for one in outputs if one.how == "="}
+def values(
+    outputs: tuple[Measured, ...], result: Result, parameters: Mapping[str, float | str]
+) -> tuple[dict[str, Number], list[str]]:
+    """The numbers of a run, by name; of histories all rows, and their times [s]; and why there are none of the other outputs:
+    quantities that the result has not, formulas without a value."""
+    found, why = dict[str, Number](), list[str]()
+    for one in outputs:
+        if one.how != "=":
+            try:
+                found[one.name] = _value(one, result)
+            except InputError as error:
+                why.append(str(error))
+    left = {one.name: one.quantity for one in outputs if one.how == "="}
+    lost = {one.name for one in outputs} - found.keys() - left.keys()
+    while left:  # those first that others are made of; no two are made of each other
+        name = next(name for name, text in left.items() if not any(mentions(text, other) for other in left))
+        text = left.pop(name)
+        if not any(mentions(text, other) for other in lost):
+            try:
+                found[name] = _worked_out(text, found, parameters, f"outputs.{name}")
+            except InputError as error:
+                why.append(str(error))
+        lost |= {name} - found.keys()
+    times = {TIME: result.time.tolist()} if any(isinstance(value, list) for value in found.values()) else {}
+    return {one.name: found[one.name] for one in outputs if one.name in found} | times, why
+
+
+def _worked_out(text: str, found: Mapping[str, Number], parameters: Mapping[str, float | str], what: str) -> float:
+    """The value of a formula; NaN where it has an output that is none, such as of an item beyond the end of a list."""
     numbers = {name: value for name, value in found.items() if not isinstance(value, list)}
-    known = Parameters({**parameters, **numbers, **formulas})
-    for name, text in formulas.items():
-        found[name] = as_number(text, known, f"outputs.{name}")
-    times = {TIME: result.time.tolist()} if len(numbers) + len(formulas) < len(outputs) else {}
-    return {one.name: found[one.name] for one in outputs} | times
+    if any(mentions(text, name) and not math.isfinite(value) for name, value in numbers.items()):
+        return math.nan
+    return as_number(text, Parameters({**parameters, **numbers}), what)
 
 
-def units(outputs: tuple[Measured, ...], result: Result) -> dict[str, str]:
-    """Those of outputs that are of a quantity, by name: the unit of the quantity."""
-    found = {one.name: one.quantity for one in outputs if one.how not in ("=", ATTRIBUTE)}
-    return {name: result.quantity(quantity).unit for name, quantity in found.items()}
+def mentions(text: str, name: str) -> bool:
+    """Whether a formula, or a text with "${name}", has a name."""
+    return re.search(rf"(?<![\w.]){re.escape(name)}(?![\w.])", text) is not None
+
+
+def units(outputs: tuple[Measured, ...], result: Result, found: Iterable[str]) -> dict[str, str]:
+    """Those of outputs that were found and are of a quantity, by name: the unit of the quantity."""
+    of = {one.name: one.quantity for one in outputs if one.how not in ("=", ATTRIBUTE)}
+    return {name: result.quantity(of[name]).unit for name in found if name in of}
 
 
 def _value(one: Measured, result: Result) -> Number:

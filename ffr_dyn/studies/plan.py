@@ -23,13 +23,10 @@ Paths are relative to the file; `points = "list"` takes the values of all parame
 
 from __future__ import annotations
 
-import hashlib
-import json
 import math
-import os
 import re
 import shlex
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, get_args
@@ -39,12 +36,22 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from ffr_dyn.functions.formula import TIME, names_in, parse
 from ffr_dyn.scene_file.assignments import unknown
-from ffr_dyn.scene_file.parameters import flattened, nearest, substituted
+from ffr_dyn.scene_file.parameters import PLACEHOLDER, flattened, nearest, substituted
 from ffr_dyn.scene_file.read import body_files
 from ffr_dyn.scene_file.source import read_source
-from ffr_dyn.studies.measures import HISTORY, Measured, measured
-from ffr_dyn.studies.runs import body_file
-from ffr_dyn.studies.sampling import USUAL, Axis, Sampling, Spread, Value, points, spaced, with_unit
+from ffr_dyn.studies.measures import HISTORY, Measured, measured, mentions
+from ffr_dyn.studies.sampling import (
+    SHAPING,
+    USUAL,
+    Axis,
+    Sampling,
+    Spread,
+    Value,
+    points,
+    pure_numbers,
+    spaced,
+    with_unit,
+)
 from ffr_prep.common.brief import Brief, cut
 from ffr_prep.common.entries import places_of
 from ffr_prep.common.errors import InputError
@@ -53,7 +60,7 @@ from ffr_prep.common.strict import complaint, entry_keys
 from ffr_prep.common.units import dimension_of, in_words, split_quantity, to_si
 
 MAKING = ("reduce", "reduce-structure", "reduce-matrices")
-TAKEN = ("run", "row", "time", "message")  # columns that every table may have
+TAKEN = ("run", "row", "time", "message", "notes")  # columns that every table may have
 
 
 class BodyRecipe(BaseModel):
@@ -127,6 +134,10 @@ def load_study(path: str | Path) -> Study:
     """
     path = Path(path)
     tree = read_toml(path, "a study file")
+    if "scene" not in tree and {"bodies", "ground"} <= tree.keys():
+        raise InputError(
+            f"{path} is no study but a scene, which `ffr-dyn run` analyses; a study names it: scene = {path.name!r}"
+        )
     try:
         entry = StudyFile.model_validate(tree)
     except ValidationError as error:
@@ -167,23 +178,27 @@ def study(
         raise InputError("parameters: there are none; name at least one with its values, such as load = [10, 50]")
     if not outputs:
         raise InputError('outputs: there are none; name at least one, such as force = "pin.force: largest"')
-    _check_settings(parameters, points_are, samples, sampling, seed)
+    leaves = list(_leaves(parameters, _known(Path(scene), bodies.values())))
+    found = {name: _values(name, given) for name, given in leaves}
+    if len(found) < len(leaves):
+        twice = next(name for k, (name, _) in enumerate(leaves) if name in dict(leaves[:k]))
+        raise InputError(f"parameters.{twice}: it is given twice, with quotes and without; give its values once")
+    _check_settings(found, points_are, samples, sampling, seed)
     made = Study(
         Path(scene),
-        points(
-            {name: _values(name, given) for name, given in _leaves(parameters)}, samples=samples, sampling=sampling,
-            seed=seed, paired=points_are == "list",
-        ),
+        points(found, samples=samples, sampling=sampling, seed=seed, paired=points_are == "list"),
         tuple(measured(name, text) for name, text in outputs.items()),
         dict(bodies),
         Path(folder),
         histories,
-    )  # fmt: skip
+    )
     _check(made)
     return made
 
 
-def _check_settings(parameters: Mapping[str, Any], points_are: str, samples: int, sampling: str, seed: int) -> None:
+def _check_settings(
+    found: Mapping[str, Axis | Spread], points_are: str, samples: int, sampling: str, seed: int
+) -> None:
     """InputError for settings that no study can have, or that change nothing."""
     for name, given, known in (("points", points_are, ("grid", "list")), ("sampling", sampling, get_args(Sampling))):
         if given not in known:
@@ -191,7 +206,7 @@ def _check_settings(parameters: Mapping[str, Any], points_are: str, samples: int
     for name, number in (("samples", samples), ("seed", seed)):
         if type(number) is not int or number < 0:
             raise InputError(f"{name} is {number!r}; give a whole number, 0 or more")
-    if samples and not any(isinstance(_values(name, given), Spread) for name, given in _leaves(parameters)):
+    if samples and not any(isinstance(values, Spread) for values in found.values()):
         raise InputError(
             f"samples = {samples} changes nothing: no parameter has a distribution such as {{uniform = [1, 3]}}; leave it out"
         )
@@ -202,20 +217,36 @@ def _hint(where: str) -> str:
     return nearest(name, dict.fromkeys(BodyRecipe.model_fields if table else StudyFile.model_fields))
 
 
-def _leaves(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
-    """Parameters by dotted name: a table is one of values where its keys say so."""
+def _known(scene: Path, lines: Iterable[str]) -> frozenset[str]:
+    """The names that a study may give values to: of the scene, and those that stand in lines that make bodies."""
+    tree = read_source(scene).tree
+    named = (name for line in lines for name in PLACEHOLDER.findall(line))
+    return frozenset([*flattened(tree.get("parameters", {})), *places_of(tree), *named])
+
+
+def _leaves(table: Mapping[str, Any], known: Set[str], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """Parameters by dotted name: `crank.length = [1, 2]` is a table of them, {normal = [1, 2]} is a value."""
     for key, value in table.items():
-        if isinstance(value, Mapping) and not _says_values(value):
-            yield from _leaves(value, f"{prefix}{key}.")
+        name = f"{prefix}{key}"
+        if isinstance(value, Mapping) and (_holds(value, f"{name}.", known) or not (name in known or _says(value))):
+            yield from _leaves(value, known, f"{name}.")
         else:
-            yield f"{prefix}{key}", value
+            yield name, value
 
 
-def _says_values(table: Mapping[str, Any]) -> bool:
-    """Whether a table is a range or a distribution, and no table of parameters."""
-    if "from" in table or (len(table) == 1 and table.keys() <= USUAL.keys()):
-        return True
-    return len(table) == 1 and all(isinstance(given, list) and _are_numbers(given) for given in table.values())
+def _holds(table: Mapping[str, Any], prefix: str, known: Set[str]) -> bool:
+    """Whether one of its keys begins or is the name of a parameter."""
+    names = tuple(f"{prefix}{key}" for key in table)
+    return any(one in names or one.startswith(tuple(f"{name}." for name in names)) for one in known)
+
+
+def _says(table: Mapping[str, Any]) -> bool:
+    """Whether a table at an unknown name was meant for values, and is no table of parameters."""
+    return "from" in table or (len(table) == 1 and (next(iter(table)) in USUAL or _are_lists(table.values())))
+
+
+def _are_lists(given: Iterable[Any]) -> bool:
+    return all(isinstance(one, list) and _are_numbers(one) for one in given)
 
 
 def _are_numbers(given: Sequence[Any]) -> bool:
@@ -268,14 +299,15 @@ def _range(name: str, given: Mapping[str, Any]) -> Axis:
 
 
 def _spread(name: str, kind: str, numbers: Sequence[Any]) -> Spread:
-    """A distribution; with units where all its numbers have one, of a lognormal one its median."""
-    pure = list(numbers[1:]) if kind == "lognormal" else []
-    if not _are_numbers(pure):
+    """A distribution; with units where all its numbers have one, but those that give its shape."""
+    pure = range(len(numbers))[pure_numbers(kind)]
+    if not _are_numbers([numbers[k] for k in pure]):
         raise InputError(
-            f"parameters.{name}: lognormal {numbers}: the deviation of the logarithm is a number without a unit"
+            f"parameters.{name}: {kind} {numbers}: {SHAPING.get(kind, 'what gives its shape')} is a number without a unit"
         )
-    found, unit = _in_si(name, numbers[: len(numbers) - len(pure)])
-    return Spread(kind, (*found, *map(float, pure)), unit)
+    found, unit = _in_si(name, [number for k, number in enumerate(numbers) if k not in pure])
+    left = iter(found)
+    return Spread(kind, tuple(float(number) if k in pure else next(left) for k, number in enumerate(numbers)), unit)
 
 
 def _in_si(name: str, given: Sequence[Any]) -> tuple[list[float], str]:
@@ -304,14 +336,15 @@ def units_of(made: Study) -> dict[str, str]:
 
 def _check(made: Study) -> None:
     tree = read_source(made.scene).tree
-    own, places, texts = flattened(tree.get("parameters", {})), places_of(tree), list(_texts(tree))
+    own, places = flattened(tree.get("parameters", {})), places_of(tree)
+    used = reached(_texts({key: item for key, item in tree.items() if key != "parameters"}), own)
     for name in made.parameters:
         if re.fullmatch(r"[A-Za-z_]\w*(\.\w+)*", name) is None:
             raise InputError(f"parameters.{name}: use letters, digits, '_' and dots in its name")
-        in_bodies = any(_mentions(line, name) for line in made.recipes.values())
+        in_bodies = any(mentions(line, name) for line in made.recipes.values())
         if not in_bodies and name not in own and name not in places:
             raise InputError(f"in {made.scene} and in lines that make bodies {unknown(name, own, places)}")
-        if not in_bodies and name in own and not any(_mentions(text, name) for text in texts):
+        if not in_bodies and name in own and name not in used:
             raise InputError(f"the parameter {name!r} changes nothing: nothing in {made.scene} uses it; leave it out")
     _check_overlap(made.parameters)
     _check_names(made)
@@ -337,12 +370,12 @@ def _check_formulas(made: Study) -> None:
     known = dict.fromkeys([*made.parameters, *numbers], TIME)  # a function that is no constant: nothing is worked out
     for name, text in formulas.items():
         found = parse(text, known, f"outputs.{name}") if split_quantity(text) is None else TIME
-        if strange := next(names_in(found), "t" if "t" not in known and _mentions(text, "t") else None):
+        if strange := next(names_in(found), "t" if "t" not in known and mentions(text, "t") else None):
             raise InputError(
                 f"outputs.{name} = '= {text}': {strange!r} is no output and no parameter; {nearest(strange, known)}"
             )
     while formulas:
-        ready = [name for name, text in formulas.items() if not any(_mentions(text, other) for other in formulas)]
+        ready = [name for name, text in formulas.items() if not any(mentions(text, other) for other in formulas)]
         if not ready:
             raise InputError(f"outputs: the formulas of {', '.join(formulas)} depend on themselves")
         formulas = {name: text for name, text in formulas.items() if name not in ready}
@@ -373,8 +406,13 @@ def _check_bodies(made: Study) -> None:
         substituted(line, made.points[0], f"bodies.{name}.make")
 
 
-def _mentions(text: str, name: str) -> bool:
-    return re.search(rf"(?<![\w.]){re.escape(name)}(?![\w.])", text) is not None
+def reached(texts: Iterable[str], own: Mapping[str, Any]) -> frozenset[str]:
+    """The parameters of a scene that texts depend on, be it by way of others."""
+    texts, found = list(texts), frozenset[str]()
+    while more := {name for name in own if name not in found and any(mentions(text, name) for text in texts)}:
+        found |= more
+        texts = [str(own[name]) for name in more]
+    return found
 
 
 def _texts(tree: Any, where: tuple[str, ...] = ()) -> Iterator[str]:
@@ -392,9 +430,12 @@ def _texts(tree: Any, where: tuple[str, ...] = ()) -> Iterator[str]:
 def of_scene(made: Study, point: Mapping[str, Value]) -> dict[str, str]:
     """The parameters of a point that are the scene's, as text."""
     own = names_of_scene(made)
-    return {
-        name: repr(value) if isinstance(value, float) else str(value) for name, value in point.items() if name in own
-    }
+    return as_texts({name: value for name, value in point.items() if name in own})
+
+
+def as_texts(values: Mapping[str, Value]) -> dict[str, str]:
+    """Values as a command line gives them."""
+    return {name: repr(value) if isinstance(value, float) else str(value) for name, value in values.items()}
 
 
 def names_of_scene(made: Study) -> frozenset[str]:
@@ -407,19 +448,3 @@ def recipe(made: Study, body: str, point: Mapping[str, Value]) -> str:
     """The line that makes a body of a point; a value of several words, such as 10 mm, stays in the word that it is put in."""
     words = substituted(shlex.split(made.recipes[body]), point, f"bodies.{body}.make")
     return shlex.join(str(word) for word in words)
-
-
-def mark(made: Study) -> str:
-    """The mark that tells a study from another: its points, outputs and recipes, its scene, and the files that these name."""
-    tree = read_source(made.scene).tree
-    said = {*_texts(tree), *(value for point in made.points for value in point.values() if isinstance(value, str))}
-    files = {text: made.scene.parent / text for text in said if os.path.isfile(made.scene.parent / text)}
-    whole = [
-        [sorted(point.items()) for point in made.points],
-        [[one.name, one.quantity, one.how] for one in made.outputs],
-        sorted((name, line, body_file(line, made.folder, Path()).name) for name, line in made.recipes.items()),
-        tree,
-        {text: hashlib.sha256(file.read_bytes()).hexdigest() for text, file in files.items()},
-        made.histories,
-    ]
-    return hashlib.sha256(json.dumps(whole, sort_keys=True, default=str).encode()).hexdigest()

@@ -7,10 +7,9 @@ the file is named by what it is made from, line and contents of the files in it,
 from __future__ import annotations
 
 import contextlib
-import hashlib
 import io
-import re
 import shlex
+import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
@@ -24,13 +23,14 @@ from ffr_dyn.scene_file.read import load_scene
 from ffr_dyn.studies.measures import ERROR, Measured, Number, units, values, wanted
 from ffr_prep.body import BodyError, FlexibleBody, load_body
 from ffr_prep.common.errors import ComputationError, InputError
+from ffr_prep.common.outputs import InUseError, no_room
 
 COMMAND = (
     "ffr_prep.cli"  # a command line is all that is known of it here; a process for each would load the mesher anew
 )
 LOADED = 8  # bodies that a worker keeps
-NAMING, QUOTED = (".toml", ".geo"), re.compile(r"""["']([^"'\n]{1,200})["']""")
-KEY = 24  # hexadecimal digits of a body's name
+BETWEEN = "\n"  # the notes of a run
+WAIT = 1.0  # s, for a body that another study makes
 
 
 @dataclass(frozen=True)
@@ -55,20 +55,36 @@ class Task:
 
 @dataclass(frozen=True)
 class Row:
-    """The outcome of a run: its numbers and histories with their units, or why there are none."""
+    """The outcome of a run: its numbers and histories with their units, and what the run notes; why there are none, or not
+    of all outputs."""
 
     number: int
     values: Mapping[str, Number]
     message: str = ""
     units: Mapping[str, str] = field(default_factory=dict)
+    notes: str = ""
 
 
-def perform(task: Task) -> list[Row]:
+@dataclass(frozen=True)
+class Full:
+    """No room for what a worker had to write, and the rows that it had before."""
+
+    reason: str
+    rows: tuple[Row, ...] = ()
+
+
+def perform(task: Task) -> list[Row] | Full:
     """The rows of a task."""
-    return [_row(task, point) for point in task.points]
+    rows = list[Row]()
+    for point in task.points:
+        row = _row(task, point)
+        if isinstance(row, Full):
+            return replace(row, rows=tuple(rows))
+        rows.append(row)
+    return rows
 
 
-def _row(task: Task, point: Point) -> Row:
+def _row(task: Task, point: Point) -> Row | Full:
     missing = [f"body {name!r}: {path[1:]}" for name, path in point.bodies.items() if path.startswith("!")]
     if missing:
         return Row(point.number, {}, missing[0])
@@ -77,10 +93,16 @@ def _row(task: Task, point: Point) -> Row:
         scene, settings = load_scene(task.scene, point.of_scene, bodies)
         path = f"{task.histories}/run-{point.number:06d}.nc" if task.histories else None
         result = run(scene, _kept(settings, task.outputs, bool(path)), path=path)
-        found = values(task.outputs, result, point.parameters)
-        return Row(point.number, found, units=units(task.outputs, result))
+        found, why = values(task.outputs, result, point.parameters)
+        notes = BETWEEN.join(map(str, result.attributes.get("notes", ())))
+        return Row(point.number, found, _in_a_line("; ".join(why)), units(task.outputs, result, found), notes)
     except (InputError, BodyError, ComputationError) as error:
-        return Row(point.number, {}, " ".join(str(error).split()))
+        message = _in_a_line(str(error))
+        return Full(message) if no_room(error) else Row(point.number, {}, message)
+
+
+def _in_a_line(text: str) -> str:
+    return " ".join(text.split())
 
 
 @lru_cache(maxsize=LOADED)
@@ -111,39 +133,21 @@ class Recipe:
     file: str
 
 
-def body_file(line: str, folder: Path, cache: Path) -> Path:
-    """Where a body is kept: named by its line and by what is in the files that it names, and that these name."""
-    words = shlex.split(line)
-    digest = hashlib.sha256(repr(words).encode())
-    for word in words[1:]:
-        named = folder / word.rpartition("=")[2]
-        for file in (named, *_files_in(named)) if named.is_file() else ():
-            digest.update(file.read_bytes())
-    return cache / f"{digest.hexdigest()[:KEY]}.ffr"
-
-
-def _files_in(path: Path) -> list[Path]:
-    """The files that a structure file or a geometry script names, between quotes."""
-    if path.suffix not in NAMING:
-        return []
-    said = {found[1] for found in QUOTED.finditer(path.read_text(encoding="utf-8", errors="replace"))}
-    return [file for file in (path.parent / name for name in sorted(said)) if file.is_file()]
-
-
-def make(recipe: Recipe) -> str:
-    """Make a body, if its file is not there. Returns why it could not be made, or nothing."""
+def make(recipe: Recipe) -> str | Full:
+    """Make a body, if its file is not there, or wait for another study that does. Returns why it could not be made, or
+    nothing."""
     target = Path(recipe.file)
-    if target.exists():
-        return ""
     words = [_placed(word, Path(recipe.folder)) for word in shlex.split(recipe.line)]
-    said = io.StringIO()
-    try:
-        with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
-            import_module(COMMAND).cli.main(args=[*words, "-o", str(target)], standalone_mode=False)
-    except (InputError, BodyError, ComputationError) as error:
-        return " ".join(str(error).split())
-    except Exception as error:  # click's own of a word that it does not know
-        return " ".join(getattr(error, "message", str(error)).split())
+    while not target.exists():
+        said = io.StringIO()
+        try:
+            with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
+                import_module(COMMAND).cli.main(args=[*words, "-o", str(target)], standalone_mode=False)
+        except InUseError:
+            time.sleep(WAIT)
+        except Exception as error:  # also click's own of a word that it does not know
+            why = _in_a_line(getattr(error, "message", str(error)))
+            return Full(why) if no_room(error) else why
     return ""
 
 

@@ -73,7 +73,7 @@ class Spread:
             raise InputError(
                 f"there is no distribution {self.kind!r}; there are {', '.join(USUAL)} and those of scipy.stats"
             )
-        shapes = [] if made.shapes is None else made.shapes.split(", ")
+        shapes = _shapes(self.kind)
         if not len(shapes) <= len(n) <= len(shapes) + 2:
             takes = ", ".join([*shapes, "loc", "scale"])
             raise InputError(f"{self.kind} takes [{takes}], and {len(n)} numbers are given")
@@ -86,6 +86,20 @@ USUAL = {
     "triangular": ("least", "likeliest", "most"),
     "lognormal": ("median", "deviation of the logarithm"),
 }
+
+
+SHAPING = {"lognormal": "the deviation of the logarithm"}  # what else than shape parameters has no unit
+
+
+def pure_numbers(kind: str) -> slice:
+    """Which numbers of a distribution have no unit, whatever it is of: those that give its shape."""
+    return slice(1, None) if kind in SHAPING else slice(0 if kind in USUAL else len(_shapes(kind)))
+
+
+def _shapes(kind: str) -> list[str]:
+    """The shape parameters of a distribution of scipy.stats; none of what is no such."""
+    said = getattr(getattr(stats, kind, None), "shapes", None)
+    return said.split(", ") if isinstance(said, str) else []
 
 
 def with_unit(values: Sequence[Value], unit: str) -> list[Value]:

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import replace
 from pathlib import Path
 
-from ffr_dyn.chart.runner import Failure, Pool, pool
+from ffr_dyn.chart.runner import Failure, Lost, Pool, pool
 from ffr_dyn.functions.together import processors
-from ffr_dyn.studies.plan import Study, load_study, names_of_scene, recipe
-from ffr_dyn.studies.runs import Point, Recipe, Row, Task, body_file, make, perform
+from ffr_dyn.studies.identity import Contents, body_file
+from ffr_dyn.studies.plan import Study, as_texts, load_study, names_of_scene, recipe
+from ffr_dyn.studies.runs import Full, Point, Recipe, Row, Task, make, perform
 from ffr_dyn.studies.table import Journal, Table, journal_of, save_table, table
 from ffr_dyn.studies.workers import crew
 from ffr_prep.common.errors import ComputationError, InputError
@@ -64,7 +65,7 @@ def sweep(
                 end.add_note(f"{kept}, and the same command goes on with them")
                 raise
         found = table(made, journal.rows)
-        if found.failed.size == len(found):
+        if not any(row.values for row in journal.rows.values()):
             journal_of(path).unlink()
             raise ComputationError(f"no run has succeeded; the first says: {found.messages[0]}")
         save_table(found, path)
@@ -93,12 +94,14 @@ def _bodies(
     if not lines:
         return {}
     folder.mkdir(parents=True, exist_ok=True)
-    files = {key: str(body_file(key[1], study.folder, folder).resolve()) for key in lines}
+    known: Contents = {}
+    files = {key: str(body_file(key[1], study.folder, folder, known).resolve()) for key in lines}
     wanted = {file: Recipe(line, str(study.folder.resolve()), file) for (_, line), file in files.items()}
     missing = [one for one in wanted.values() if not Path(one.file).exists()]
     failed = {}
     for done, (k, why) in enumerate(where.results(make, missing), 1):
         making(done, len(missing))
+        _check(why)
         if why := why.reason if isinstance(why, Failure) else why:
             failed[missing[k].file] = f"!{why}"
     return {key: failed.get(file, file) for key, file in files.items()}
@@ -112,7 +115,7 @@ def _points(study: Study, left: Sequence[int], bodies: Mapping[tuple[str, str], 
     own, found = names_of_scene(study), []
     for k in left:
         point = study.points[k]
-        texts = {name: repr(v) if isinstance(v, float) else str(v) for name, v in point.items() if name in own}
+        texts = as_texts({name: value for name, value in point.items() if name in own})
         files = {name: bodies[name, recipe(study, name, point)] for name in study.recipes}
         found.append(Point(k, point, texts, files))
     return sorted(found, key=lambda point: (sorted(point.bodies.items()), point.number))
@@ -124,19 +127,47 @@ def _run(study: Study, path: Path, points: list[Point], where: Pool, journal: Jo
         Path(f"{path}.runs").mkdir(parents=True, exist_ok=True)
         histories = str(Path(f"{path}.runs").resolve())
     whole = Task(str(study.scene.resolve()), study.outputs, (), histories)
-    tasks = [replace(whole, points=tuple(some)) for some in _shares(points)]
-    total = len(study.points)
-    for k, rows in where.results(perform, tasks):
-        if isinstance(rows, Failure):
-            rows = [Row(point.number, {}, rows.reason) for point in tasks[k].points]
+    lost = _performed(whole, _shares(points), where, journal, progress)
+    _performed(whole, [[point] for task in lost for point in task.points], where, journal, progress)
+
+
+def _performed(
+    whole: Task, shares: Iterable[Sequence[Point]], where: Pool, journal: Journal, progress: Progress
+) -> list[Task]:
+    """Put the rows of all shares into the journal. Returns the tasks of several runs that no worker has survived: one of
+    them brings it down, and takes the others along."""
+    tasks, lost = [replace(whole, points=tuple(some)) for some in shares], list[Task]()
+    for k, found in where.results(perform, tasks):
+        if isinstance(found, Lost):
+            _check(found)
+        rows = found.rows if isinstance(found, Full) else found
+        if isinstance(found, Failure):
+            if len(tasks[k].points) > 1:
+                lost.append(tasks[k])
+                continue
+            rows = [Row(tasks[k].points[0].number, {}, found.reason)]
         try:
             journal.add(rows)
         except OSError as error:
             raise InputError(
-                f"{journal_of(path)}: {error.strerror or error}; make room, or choose another place, and run the same again: "
+                f"{journal.path}: {error.strerror or error}; make room, or choose another place, and run the same again: "
                 "what is done is kept"
             ) from None
-        progress(len(journal.rows), total)
+        _check(found)
+        progress(len(journal.rows), journal.runs)
+    return lost
+
+
+def _check(found: object) -> None:
+    """Raises an error where a worker has no room for what it writes, or where there are no workers any more."""
+    if isinstance(found, Full):
+        raise InputError(
+            f"{found.reason}; make room, or choose another place, and run the same again: what is done is kept"
+        )
+    if isinstance(found, Lost):
+        raise ComputationError(
+            f"{found.reason}; start another, and run the same again, with its address: what is done is kept"
+        )
 
 
 def _shares(points: list[Point]) -> Iterator[list[Point]]:

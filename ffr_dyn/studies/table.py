@@ -10,7 +10,9 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Mapping, Set
+import re
+from collections.abc import Iterable, Mapping, Set
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Self
@@ -18,9 +20,11 @@ from typing import Any, Self
 import h5py
 import numpy as np
 
+from ffr_dyn.results.file import STUDY
+from ffr_dyn.studies.identity import mark
 from ffr_dyn.studies.measures import HISTORY, TIME, Number
-from ffr_dyn.studies.plan import Study, mark, units_of
-from ffr_dyn.studies.runs import Row
+from ffr_dyn.studies.plan import Study, units_of
+from ffr_dyn.studies.runs import BETWEEN, Row
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.brief import Brief, Rows
 from ffr_prep.common.errors import InputError
@@ -32,8 +36,8 @@ from ffr_prep.common.units import dimension_of, split_quantity, to_si
 from ffr_prep.common.units import in_words as dimension_in_words
 
 RUN, ROW = "run", "row"
-MESSAGE = "message"
-SECTION, FORMAT = "ffr_study", 1
+MESSAGE, NOTES = "message", "notes"
+FORMAT = 1
 
 
 @dataclass(frozen=True, repr=False)
@@ -41,9 +45,10 @@ class Table(Brief):
     """The rows of a study.
 
     parameters : by name, a value of every run: numbers (N,), in SI where they were written with a unit, or texts
-    outputs    : by name (N,), NaN for runs that failed or were not done; of histories (N, T), NaN beyond the last row of a
+    outputs    : by name (N,), NaN where a run has none, as one that failed; of histories (N, T), NaN beyond the last row of a
                  run, with "time" [s] (N, T)
-    messages   : why a run has failed; empty for the others
+    messages   : why a run has failed, or has not all outputs; empty for the others
+    notes      : what the run of a row notes of itself, such as rows too coarse for what moves between them
     units      : of outputs that are of a quantity of the runs; of parameters whose value the scene or the study writes with
                  a unit, in SI
 
@@ -55,6 +60,7 @@ class Table(Brief):
     outputs: Mapping[str, Array]
     messages: tuple[str, ...]
     units: Mapping[str, str] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         return len(self.messages)
@@ -92,16 +98,16 @@ def table(study: Study, rows: Mapping[int, Row]) -> Table:
         check_memory(3 * 8.0 * count * longest * (len(whole) + 1), f"histories of {count} runs", remedy)
     outputs = {one.name: np.full((count, longest) if one.name in whole else count, np.nan) for one in study.outputs}
     outputs |= {TIME: np.full((count, longest), np.nan)} if whole else {}
-    messages, units = [""] * count, units_of(study) | ({TIME: "s"} if whole else {})
+    messages, notes, units = [""] * count, [""] * count, units_of(study) | ({TIME: "s"} if whole else {})
     for number, row in rows.items():
-        messages[number] = row.message
+        messages[number], notes[number] = row.message, row.notes
         units.update(row.units)
         for name, value in row.values.items():
             outputs[name][number, ...] = _padded(value, longest) if isinstance(value, list) else value
     columns = {name: [point[name] for point in study.points] for name in study.parameters}
     made = {name: _column(values, units.get(name)) for name, values in columns.items()}
     units |= {name: unit for name, (_, unit) in made.items() if unit}
-    return Table({name: values for name, (values, _) in made.items()}, outputs, tuple(messages), units)
+    return Table({name: values for name, (values, _) in made.items()}, outputs, tuple(messages), units, tuple(notes))
 
 
 def _padded(values: list[float], count: int) -> list[float]:
@@ -122,6 +128,15 @@ def _column(values: list[Any], unit: str | None) -> tuple[Any, str | None]:
     return np.array([size.get(one, one) for one in values], dtype=float), unit
 
 
+def noted(made: Table) -> list[tuple[int, str]]:
+    """(how many runs note it, the note) of all notes, those that differ in their numbers alone by the first of them."""
+    found: dict[str, list[str]] = {}
+    for note in (one for text in made.notes if text for one in text.split(BETWEEN)):
+        found.setdefault(_DIGITS.sub("#", note), []).append(note)
+    return sorted(((len(same), same[0]) for same in found.values()), key=lambda one: -one[0])
+
+
+_DIGITS = re.compile(r"\d[\d.e+-]*")
 _DAMAGE = (ValueError, TypeError, KeyError, AttributeError, OverflowError, RecursionError)  # of a line of the journal
 
 
@@ -141,10 +156,10 @@ class Journal:
 
     def __init__(self, path: str | Path, study: Study) -> None:
         self.rows: dict[int, Row] = {}
-        self._outputs = {one.name for one in study.outputs}
-        self._path, begun = journal_of(path), {"study": mark(study), "runs": len(study.points)}
-        sound = self._read(begun) if self._path.exists() else 0
-        self._file = open(self._path, "r+b" if self._path.exists() else "w+b")  # noqa: SIM115 - held while runs end
+        self.runs, self._outputs = len(study.points), {one.name for one in study.outputs}
+        self.path, begun = journal_of(path), {"study": mark(study), "runs": self.runs}
+        sound = self._read(begun) if self.path.exists() else 0
+        self._file = open(self.path, "r+b" if self.path.exists() else "w+b")  # noqa: SIM115 - held while runs end
         self._file.truncate(sound)
         self._file.seek(sound)
         if not sound:
@@ -152,7 +167,7 @@ class Journal:
 
     def _read(self, begun: Mapping[str, Any]) -> int:
         """The length of what is whole."""
-        sound, lines = 0, self._path.read_bytes().split(b"\n")[:-1]
+        sound, lines = 0, self.path.read_bytes().split(b"\n")[:-1]
         for k, line in enumerate(lines):
             try:
                 entry = json.loads(line)
@@ -161,7 +176,7 @@ class Journal:
                 break
             if k == 0 and entry != begun:
                 raise InputError(
-                    f"{self._path} is of another study, or of this one before it was changed: name another output, or remove "
+                    f"{self.path} is of another study, or of this one before it was changed: name another output, or remove "
                     "it to begin anew"
                 )
             if row is not None:
@@ -169,12 +184,12 @@ class Journal:
             sound += len(line) + 1
         return sound
 
-    def add(self, rows: list[Row]) -> None:
+    def add(self, rows: Iterable[Row]) -> None:
         """Rows that are done, on the disk when this returns. Raises OSError where they cannot be kept."""
         for row in rows:
             self.rows[row.number] = row
             entry = {"run": row.number, "values": dict(row.values), "message": row.message, "units": dict(row.units)}
-            self._write(entry, flush=False)
+            self._write(entry | {"notes": row.notes}, flush=False)
         self._flush()
 
     def _write(self, entry: Mapping[str, Any], flush: bool = True) -> None:
@@ -190,7 +205,8 @@ class Journal:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._file.close()
+        with suppress(OSError):  # of rows that a full disk has not taken, which was said
+            self._file.close()
 
 
 def _row(entry: Mapping[str, Any], runs: int, outputs: Set[str]) -> Row:
@@ -198,9 +214,8 @@ def _row(entry: Mapping[str, Any], runs: int, outputs: Set[str]) -> Row:
     number, values = int(entry["run"]), {str(name): _number(value) for name, value in entry["values"].items()}
     if not (0 <= number < runs and values.keys() <= outputs | {TIME}):
         raise ValueError(number)
-    return Row(
-        number, values, str(entry["message"]), {name: str(unit) for name, unit in entry.get("units", {}).items()}
-    )
+    units = {name: str(unit) for name, unit in entry.get("units", {}).items()}
+    return Row(number, values, str(entry["message"]), units, str(entry.get("notes", "")))
 
 
 def _number(value: Any) -> Number:
@@ -212,12 +227,13 @@ def _number(value: Any) -> Number:
 
 def save_table(made: Table, path: str | Path) -> None:
     """Write a table (netCDF-4), whole or not at all."""
+    texts = {MESSAGE: list(made.messages), NOTES: list(made.notes or [""] * len(made))}
     with replacing(path) as part, new_file(part) as file:
-        file.attrs[SECTION] = FORMAT
+        file.attrs[STUDY] = FORMAT
         _variable(file, RUN, np.arange(len(made), dtype=np.int64)).make_scale(RUN)
         if TIME in made.outputs:
             _variable(file, ROW, np.arange(made.outputs[TIME].shape[1], dtype=np.int64)).make_scale(ROW)
-        for name, values in {**made.parameters, **made.outputs, MESSAGE: list(made.messages)}.items():
+        for name, values in {**made.parameters, **made.outputs, **texts}.items():
             data = _variable(file, name, values)
             for dimension, scale in zip(data.dims, (RUN, ROW), strict=False):
                 dimension.attach_scale(file[scale])
@@ -246,19 +262,20 @@ def load_table(path: str | Path) -> Table:
 
 
 def _read(path: Path) -> Table:
-    with h5py.File(path, "r", locking=False) as file:
-        if SECTION not in file.attrs:
+    with h5py.File(path, "r") as file:
+        if STUDY not in file.attrs:
             raise InputError(f"{path} is not the table of a study; ffr-dyn sweep writes one")
-        if file.attrs[SECTION] != FORMAT:
+        if file.attrs[STUDY] != FORMAT:
             raise InputError(
-                f"{path} is a table of format {file.attrs[SECTION]}, and this version reads format {FORMAT}: use the version "
+                f"{path} is a table of format {file.attrs[STUDY]}, and this version reads format {FORMAT}: use the version "
                 "that wrote it, or sweep again"
             )
-        found = {name: _values(data) for name, data in file.items() if name not in (RUN, ROW, MESSAGE)}
+        found = {name: _values(data) for name, data in file.items() if name not in (RUN, ROW, MESSAGE, NOTES)}
         parameters = {name: values for name, values in found.items() if "parameter" in file[name].attrs}
         outputs = {name: values for name, values in found.items() if name not in parameters}
         units = {name: str(file[name].attrs["units"]) for name in found if "units" in file[name].attrs}
-        return Table(parameters, outputs, tuple(_values(file[MESSAGE])), units)
+        notes = tuple(_values(file[NOTES])) if NOTES in file else ()
+        return Table(parameters, outputs, tuple(_values(file[MESSAGE])), units, notes)
 
 
 def _values(data: h5py.Dataset) -> Any:

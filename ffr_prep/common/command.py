@@ -63,7 +63,7 @@ def reserve(option: str, path: Path | None, suffixes: Sequence[str] = (), usual:
     try:
         click.get_current_context().with_resource(reserved(path))
     except InputError as error:
-        raise InputError(f"{option} {error}") from None
+        raise type(error)(f"{option} {error}") from None
     check_ending(option, path, usual)
 
 

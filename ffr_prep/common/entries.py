@@ -20,6 +20,13 @@ def places_of(tree: Mapping[str, Any]) -> dict[str, Keys]:
     return {".".join(keys): keys for keys in _leaves(tree, ())}
 
 
+def value_at(tree: Any, keys: Keys) -> Any:
+    """The value of an entry that the tree has."""
+    for key in keys:
+        tree = tree[int(key) - 1] if isinstance(tree, list) else tree[key]
+    return tree
+
+
 def changed(tree: Any, keys: Keys, value: Any) -> Any:
     """A copy of a tree with another value of an entry."""
     if not keys:

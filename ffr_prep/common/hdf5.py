@@ -19,10 +19,11 @@ _HEADER = 16  # bytes, of a heap and of an object in it
 
 @contextmanager
 def new_file(path: Path) -> Iterator[Any]:
-    """An HDF5 file to write: made in memory, on the disk when the block has ended. Raises OSError where it is not."""
+    """An HDF5 file to write, which keeps the order of its variables: made in memory, on the disk when the block has ended.
+    Raises OSError where it is not."""
     import h5py
 
-    with h5py.File(path, "w", driver="core", backing_store=False, **HOW) as file:
+    with h5py.File(path, "w", driver="core", backing_store=False, track_order=True, **HOW) as file:
         yield file
         file.flush()
         content = file.id.get_file_image()

@@ -8,6 +8,7 @@ nor its target is replaced), a folder, or a device. Windows has no such lock.
 
 from __future__ import annotations
 
+import errno
 import os
 import stat
 import sys
@@ -20,11 +21,16 @@ from pathlib import Path
 from ffr_prep.common.errors import ComputationError, InputError
 
 PART = ".part"
+NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 _LOCKS = sys.platform != "win32"
 _OPENED = os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
 
 Identity = tuple[int, int]  # of a file, whatever its name: device and number
 _INPUTS: ContextVar[dict[Identity, Path] | None] = ContextVar("inputs of the command", default=None)
+
+
+class InUseError(InputError):
+    """A place that another run writes to."""
 
 
 @dataclass
@@ -160,7 +166,7 @@ def _held(path: Path, *, writing: bool) -> Iterator[_Hold | None]:
     key = part_of(path.resolve())
     before = _HELD.get(key)
     if before is not None and (before.writing or not writing):
-        raise InputError(_in_use(path))
+        raise InUseError(_in_use(path))
     lock = before.lock if before is not None and _is_at(before.lock, key) else _locked(path, key)
     hold = _HELD[key] = _Hold(lock, writing)
     try:
@@ -185,7 +191,7 @@ def _locked(path: Path, part: Path) -> int:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
             os.close(lock)
-            raise InputError(_in_use(path)) from None
+            raise InUseError(_in_use(path)) from None
         except OSError:  # a file system without locks
             return lock
         if _is_at(lock, part):
@@ -198,6 +204,14 @@ def _is_at(opened: int, path: Path) -> bool:
         return _identity(os.fstat(opened)) == _identity(os.lstat(path))
     except FileNotFoundError:
         return False
+
+
+def no_room(error: BaseException) -> bool:
+    """Whether an error came of a disk that is full, or of a limit to what may be written."""
+    cause: BaseException | None = error
+    while cause is not None and not (isinstance(cause, OSError) and cause.errno in NO_ROOM):
+        cause = cause.__cause__ or cause.__context__
+    return cause is not None
 
 
 def _in_use(path: Path) -> str:

@@ -16,10 +16,13 @@ from test_parts_command import CLAMPED
 from test_sweep import SCENE
 
 import ffr_dyn as fd
+from ffr_dyn.chart.runner import Lost
 from ffr_dyn.studies.draw import plot_study
 from ffr_dyn.studies.measures import attribute
 from ffr_dyn.studies.plan import study
+from ffr_dyn.studies.runs import Full
 from ffr_dyn.studies.sampling import Axis, Spread, points, spaced
+from ffr_dyn.studies.sweep import _check
 from ffr_dyn.studies.table import FORMAT, Journal, Table, load_table
 from ffr_dyn.studies.workers import _refused, crew
 
@@ -69,13 +72,13 @@ def at_rest(output: str) -> object:
     return inside(sweep)
 
 
-def read(*, study: bool, of_format: int = FORMAT) -> object:
-    def load() -> Table:
+def read(*, study: bool, of_format: int = FORMAT, by: Callable[[str], object] = load_table) -> object:
+    def load() -> object:
         scene, settings = fd.load_scene("bar.toml")
         fd.forward(scene, **settings.span, method=settings.method, check=False, path="run.nc")
         with patch("ffr_dyn.studies.table.FORMAT", of_format):
             fd.sweep(fd.study("bar.toml", G, ANGLE), "table.nc", workers=0)
-        return load_table("table.nc" if study else "run.nc")
+        return by("table.nc" if study else "run.nc")
 
     return inside(load)
 
@@ -162,5 +165,12 @@ CASES = [
     Case(p(TABLE.__getitem__, "angel"), p(TABLE.__getitem__, "angle")),
     Case(p(read, study=False), p(read, study=True)),
     Case(p(drawn, NUMBERS, "angel"), p(drawn, NUMBERS, "angle")),
-    Case(p(drawn, ["a", "b", "c"], "angle"), p(drawn, NUMBERS, "angle")),
+    Case(p(drawn, ["a", "a", "a"], "angle"), p(drawn, NUMBERS, "angle")),
+    Case(asked({"length": {"beta": ["1 m", 2, "1 m", "1 m"]}}, samples=2),
+         asked({"length": {"beta": [1, 2, "1 m", "1 m"]}}, samples=2)),
+    Case(p(inside, fd.load_study, "bar.toml"), p(inside, fd.load_scene, "bar.toml")),
+    Case(asked({"bodies": {"bar": {"mass": [1]}}, "bodies.bar.mass": [1]}), asked({"bodies.bar.mass": [1]})),
+    Case(p(read, study=True, by=fd.load_result), p(read, study=False, by=fd.load_result)),
+    Case(p(_check, Full("writing t.nc.runs/run-000001.nc failed")), p(_check, [])),
+    Case(p(_check, Lost("the task was lost: the cluster has gone")), p(_check, [])),
 ]  # fmt: skip

@@ -18,9 +18,8 @@ import ffr_prep.cli
 from ffr_dyn.results.result import Quantity, Result
 from ffr_dyn.studies import draw
 from ffr_dyn.studies.draw import changing_most, running_mean, tornado
-from ffr_dyn.studies.measures import attribute, measured
-from ffr_dyn.studies.plan import mark
-from ffr_dyn.studies.runs import Row, body_file
+from ffr_dyn.studies.measures import attribute, measured, values
+from ffr_dyn.studies.runs import Row
 from ffr_dyn.studies.table import Journal, journal_of, table
 from ffr_prep.common.errors import ComputationError, InputError
 from ffr_prep.common.outputs import reserved
@@ -80,6 +79,7 @@ def test_every_row_is_the_run_of_its_parameters(folder):
         assert table["weight"][k] == pytest.approx(force / g, rel=1e-15)
     read = fd.load_table(folder / "t.nc")
     assert all(np.array_equal(read[name], table[name]) for name in ("g", "length", "angle", "force", "weight", "work"))
+    assert (list(read.parameters), list(read.outputs)) == (list(table.parameters), list(table.outputs))
     assert not journal_of(folder / "t.nc").exists()
     assert "12 runs" in repr(table)
 
@@ -89,6 +89,13 @@ def test_the_file_has_dimensions_and_coordinates(folder):
     with h5py.File(folder / "t.nc") as file:
         assert file["force"].dims[0][0] == file["run"]
         assert file["force"].attrs["coordinates"] == "g length"
+
+
+def test_a_table_that_xarray_has_open_is_read(folder):
+    xarray = pytest.importorskip("xarray")
+    fd.sweep(fd.study(folder / "bar.toml", {"g": [1.0]}, {"angle": "hinge.angle: last"}), folder / "t.nc", workers=0)
+    with xarray.open_dataset(folder / "t.nc") as opened:
+        assert opened["angle"][0] == fd.load_table(folder / "t.nc")["angle"][0]
 
 
 @pytest.mark.slow
@@ -117,7 +124,7 @@ def test_whole_histories_are_rows_of_a_dimension_of_their_own(folder, monkeypatc
     coloured = []
     monkeypatch.setattr(draw, "changing_most", lambda x, y: coloured.append(changing_most(x, y)) or coloured[-1])
     assert {path.name for path in fd.plot_study(table, folder / "p", ["h"])} == {"h.png", "pairs.png"}
-    assert coloured == [["analysis.end", "g"]]
+    assert coloured == [["g", "analysis.end"]]  # by 0.034 and 0.025 rad of the mean
 
 
 def test_attributes_are_found_by_the_path_of_their_keys():
@@ -220,6 +227,38 @@ def test_a_run_that_fails_is_a_row_with_its_message(folder):
         fd.sweep(fd.study(folder / "bar.toml", {"g": [1, 2]}, {"x": "hinge.torque: last"}), folder / "u.nc", workers=0)
 
 
+def test_an_output_that_a_run_has_not_leaves_the_others(folder):
+    """A formula without a value for one point, and an attribute that no run has."""
+    outputs = {
+        "angle": "hinge.angle: last",
+        "part": "= angle / (g - 2)",
+        "twice": "= 2 * part",
+        "x": "jumps: attribute",
+    }
+    table = fd.sweep(fd.study(folder / "bar.toml", {"g": [1.0, 2.0]}, outputs), folder / "t.nc", workers=0)
+    assert np.isfinite(table["angle"]).all()
+    assert np.isfinite(table["part"]).tolist() == np.isfinite(table["twice"]).tolist() == [True, False]
+    assert table["twice"][0] == -2 * table["angle"][0]
+    assert np.isnan(table["x"]).all()
+    assert table.messages[0].startswith("the result has no attribute 'jumps'")
+    assert "outputs.part: in the formula 'angle / (g - 2)'" in table.messages[1]
+    assert "outputs.twice" not in table.messages[1]
+    assert table.units["angle"] == "rad"
+
+
+def test_a_formula_of_an_item_that_a_run_has_not_is_nan(folder):
+    """As of a critical speed, which some runs have."""
+    outputs = {"rpm": "= 60 * speed", "speed": "projections.2: attribute", "angle": "hinge.angle: last"}
+    for attributes, expected in (([1.0, 2.0], 120.0), ([1.0], np.nan)):
+        result = Result(
+            np.zeros(1), {"hinge.angle": Quantity(np.ones(1), "rad")}, attributes={"projections": attributes}
+        )
+        found, why = values(tuple(measured(*one) for one in outputs.items()), result, {})
+        np.testing.assert_array_equal(found["rpm"], expected)
+        assert not why
+        assert found["angle"] == 1.0
+
+
 @pytest.mark.parametrize(("changed", "says"), [
     (("g = [1", "gg = [1"), "no parameter 'gg'.*did you mean 'g'"),
     (("g = [1", "idle = [1"), "'idle' changes nothing"),
@@ -295,6 +334,50 @@ def test_histories_are_not_computed_again(folder):
     assert (folder / "t.nc").read_bytes() == (folder / "whole.nc").read_bytes()
 
 
+def test_formulas_of_formulas_are_worked_out(folder):
+    outputs = {
+        "twice": "= 2 * weight",
+        "force": "hinge.force: largest",
+        "weight": "= force / g",
+        "same": "= weight + 0",
+    }
+    table = fd.sweep(fd.study(folder / "bar.toml", {"g": [5.0]}, outputs), folder / "t.nc", workers=0)
+    assert table["twice"] / 2 == table["weight"] == table["same"] == table["force"] / 5.0
+
+
+@pytest.mark.parametrize(
+    "parameters",
+    [
+        {"bodies": {"bar": {"mass": [1.0, 2.0]}}, "gravity": {"2": [-9.81]}},
+        {"bodies": {"bar.mass": [1.0, 2.0]}, "gravity.2": [-9.81]},
+        {"bodies.bar.mass": [1.0, 2.0], "gravity": {"2": -9.81}},
+    ],
+)
+def test_names_with_dots_may_be_tables(folder, parameters):
+    """As TOML reads `bodies.bar.mass = [1, 2]`, which is no distribution of the parameter `bodies.bar`."""
+    made = fd.study(folder / "bar.toml", parameters, {"angle": "hinge.angle: last"})
+    assert made.points == ({"bodies.bar.mass": 1.0, "gravity.2": -9.81}, {"bodies.bar.mass": 2.0, "gravity.2": -9.81})
+
+
+def test_a_parameter_that_only_another_one_without_use_has_changes_nothing(folder):
+    text = SCENE.replace("idle = 3.0", 'idle = 3.0\nlazy = "2 * idle"\nhalf = 0.5').replace(
+        "length = 1.0", 'length = "2 * half"'
+    )
+    (folder / "bar.toml").write_text(text)
+    with pytest.raises(InputError, match="'idle' changes nothing"):
+        fd.study(folder / "bar.toml", {"idle": [1, 2]}, {"angle": "hinge.angle: last"})
+    assert len(fd.study(folder / "bar.toml", {"half": [1, 2]}, {"angle": "hinge.angle: last"}).points) == 2
+
+
+def test_switches_are_what_a_scene_file_has(folder):
+    scene = (folder / "bar.toml").read_text().replace("step = 1e-3", "step = 1e-3\ncheck = true")
+    (folder / "bar.toml").write_text(scene)
+    made = fd.study(folder / "bar.toml", {"analysis.check": ["true", "false"]}, {"angle": "hinge.angle: last"})
+    table = fd.sweep(made, folder / "t.nc", workers=0)
+    assert list(table["analysis.check"]) == ["true", "false"]
+    assert not table.failed.size
+
+
 def test_a_linear_output_has_the_statistics_of_its_parameter(folder):
     """The load of a bar at rest is its weight: mean, deviation and quantiles are g times those of the mass; strata, too."""
     scene = SCENE.replace("revolute", "fixed").replace("step = 1e-3", "step = 0.01").replace("end = 0.2", "end = 0.01")
@@ -318,26 +401,6 @@ def test_a_linear_output_has_the_statistics_of_its_parameter(folder):
 def test_lines_that_make_bodies_are_looked_at(folder, line, says):
     with pytest.raises(InputError, match=says):
         fd.study(folder / "bar.toml", {"diameter": [1, 2]}, {"angle": "hinge.angle: last"}, bodies={"bar": line})
-
-
-@pytest.mark.parametrize("change", ["a body", "a geometry", "histories"])
-def test_a_study_whose_files_have_changed_is_another(folder, change):
-    """Rows of a body before and of one after its change are not put into one table."""
-    scene = SCENE.replace("[joints.hinge]", '[bodies.other]\nfile = "other.ffr"\n[joints.hinge]')
-    (folder / "bar.toml").write_text(scene)
-    (folder / "other.ffr").write_text("a")
-    (folder / "rod.geo").write_text("b")
-    given = {"scene": folder / "bar.toml", "outputs": {"angle": "hinge.angle: last"}, "folder": folder}
-    recipe = {"other": "reduce rod.geo --set d=${d}"}
-
-    def marked(histories=False):
-        return mark(fd.study(parameters={"d": [1, 2]}, bodies=recipe, histories=histories, **given))
-
-    before = marked()
-    assert marked() == before
-    if change != "histories":
-        (folder / ("other.ffr" if change == "a body" else "rod.geo")).write_text("c")
-    assert marked(histories=change == "histories") != before
 
 
 def test_a_table_of_another_format_is_refused(folder):
@@ -380,6 +443,7 @@ def test_parameters_with_units_are_numbers_in_si(folder, given, column, unit):
     ({"from": "10 mm", "to": "1000 mm", "count": 3, "spacing": "log"}, [0.01, 0.1, 1.0], "m"),
     ({"uniform": ["10 in", "20 in"]}, None, "m"),
     ({"lognormal": ["10 in", 0.1]}, None, "m"),
+    ({"truncnorm": [-2, 2, "50 cm", "10 mm"]}, None, "m"),
 ])  # fmt: skip
 def test_ranges_and_distributions_take_units(folder, given, expected, unit):
     """They run as numbers in SI do, and the unit is looked at as that of any text."""
@@ -464,8 +528,6 @@ def test_a_running_mean_has_the_standard_errors_of_its_runs():
 def test_measures_are_what_they_are_called(folder):
     scene, settings = fd.load_scene(folder / "bar.toml")
     result = fd.forward(scene, **settings.span, method=settings.method, check=True)
-    from ffr_dyn.studies.measures import values
-
     force = result["hinge.force"]
     expected = {
         "hinge.force.y: least": force[:, 1].min(), "hinge.force: greatest": force.max(),
@@ -475,21 +537,19 @@ def test_measures_are_what_they_are_called(folder):
         "hinge.angle: first": result["hinge.angle"][0], "hinge.force: error": result.attributes["errors"]["hinge.force"][0],
     }  # fmt: skip
     outputs = tuple(measured(f"o{k}", text) for k, text in enumerate(expected))
-    found = values(outputs, result, {})
+    found, _ = values(outputs, result, {})
     np.testing.assert_allclose(list(found.values()), list(expected.values()), rtol=1e-14)
 
 
 def test_means_are_over_the_time_however_rows_stand():
     """Of sin over a period and of t, with a last row soon after the one before, as where an event ends a run."""
-    from ffr_dyn.studies.measures import values
-
     time = np.append(np.linspace(0.0, 1.0, 41), 1.0 + 1e-9)
     wave, ramp = (Quantity(y, "m") for y in (np.sin(2 * np.pi * time), time))
     outputs = tuple(measured(text, text) for text in ("wave: mean", "wave: rms", "ramp: mean"))
-    found = values(outputs, Result(time, {"wave": wave, "ramp": ramp}), {})
+    found, _ = values(outputs, Result(time, {"wave": wave, "ramp": ramp}), {})
     np.testing.assert_allclose(list(found.values()), [0.0, 0.5**0.5, 0.5], atol=1e-8)
     at_speeds = Result(np.zeros(3), {"wave": Quantity(np.array([1.0, 2.0, 6.0]), "m")})
-    assert values(outputs[:1], at_speeds, {}) == {"wave: mean": 3.0}
+    assert values(outputs[:1], at_speeds, {}) == ({"wave: mean": 3.0}, [])
 
 
 STRIP = """
@@ -541,13 +601,3 @@ def test_entries_of_structure_files_and_of_scenes_are_varied(tmp_path):
     assert (table["stable"] == 1).all()
     assert np.allclose(sag[d == 0.01] / sag[d == 0.02], 4.0, rtol=1e-3)
     assert np.allclose(sag / np.abs(table["gravity.2"]) * d**2, sag[0] / 9.81 * 1e-4, rtol=1e-3)
-
-
-def test_a_body_is_known_by_the_files_that_its_files_name(tmp_path):
-    (tmp_path / "frame.toml").write_text('[geometry]\nfile = "frame.geo"\n')
-    (tmp_path / "frame.geo").write_text("Point(1) = {0, 0, 0};")
-    line = "reduce-structure frame.toml"
-    before = body_file(line, tmp_path, tmp_path)
-    assert body_file(line, tmp_path, tmp_path) == before
-    (tmp_path / "frame.geo").write_text("Point(1) = {1, 0, 0};")
-    assert body_file(line, tmp_path, tmp_path) != before

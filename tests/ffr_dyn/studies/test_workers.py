@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from places import ROOT
 
-from ffr_dyn.chart.runner import Failure
+from ffr_dyn.chart.runner import Failure, pool
 from ffr_dyn.studies.workers import crew
 from ffr_prep.common.errors import InputError
 from ffr_prep.common.registry import load_plugin
@@ -24,6 +24,11 @@ def alive(process: int) -> bool:
         return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
     except OSError:
         return False
+
+
+def dask_workers(count: int):
+    pytest.importorskip("dask.distributed")
+    return pool(count)
 
 
 def test_tasks_are_done_by_other_processes():
@@ -82,12 +87,13 @@ def test_workers_end_with_the_study_that_is_killed(tmp_path):
     assert not alive(worker)
 
 
-def test_workers_load_the_plugins(tmp_path):
+@pytest.mark.parametrize("workers_of", [crew, pytest.param(dask_workers, marks=pytest.mark.slow)])
+def test_workers_load_the_plugins(tmp_path, workers_of):
     plugin = tmp_path / "own.py"
     plugin.write_text("import builtins\nbuiltins.own_number = 42\n")
     load_plugin(plugin)
     try:
-        with crew(1) as workers:
+        with workers_of(1) as workers:
             assert list(workers.results(eval, ["own_number"])) == [(0, 42)]
     finally:
         import builtins
