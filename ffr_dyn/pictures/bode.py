@@ -42,10 +42,11 @@ def draw_nyquist(result: Result, path: str | Path) -> Path:
 
     >>> fd.draw_nyquist(result, "nyquist.png")
     """
+    transfer = result["transfer"]
     with drawing(path, (8.0, 7.0)) as figure:
         axes = figure.subplots()
         for k, name in enumerate(result.attributes["outputs"]):
-            H = result["transfer"][:, k]
+            H = transfer[:, k]
             axes.plot(H[:, 0], H[:, 1], color=PALETTE[k % len(PALETTE)], label=name)
             axes.plot(*H[0], "o", color=PALETTE[k % len(PALETTE)], markersize=6)
         axes.set_xlabel("real part")
