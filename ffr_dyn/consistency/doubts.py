@@ -21,7 +21,7 @@ from ffr_dyn.consistency.explicit_forces import candidates, fastest, told
 from ffr_dyn.consistency.following import jump_of, row_named, torn_open, unfollowed
 from ffr_dyn.consistency.validity import extremes, meaningless, strained, unstiffened
 from ffr_dyn.equations.inertia import kept_integrals, mass_matrix
-from ffr_dyn.functions.told_rates import wrong_rate
+from ffr_dyn.functions.told_rates import misled, wrong_rate
 from ffr_dyn.integrators import Integrator
 from ffr_dyn.integrators.stabilisation import Projection, Stabilisation
 from ffr_dyn.kernels.tables import MOMENT, OPENED, PHI, Record, Work
@@ -240,7 +240,7 @@ def _found(seen: Seen) -> dict[str, list[str]]:
         **_constraints(seen, quick),
         ASTRAY: [
             *(
-                _misled(callback.what, *wrong)
+                misled(callback.what, *wrong)
                 for callback, wrong in zip(seen.assembled.system.user.callbacks, seen.arrays["told"].T, strict=True)
                 if wrong[-1]
             ),
@@ -268,14 +268,6 @@ def _constraints(seen: Seen, quick: list[str]) -> dict[str, list[str]]:
         what = "the driver is not followed" if block.driver else "the mechanism has come apart"
         return {APART: [f"{where}: {what}; {quick[0] if quick else change}"]}
     return {OPEN: [f"{where}, the most of all, and more than {seen.tolerance:.1g}; {change}"]}
-
-
-def _misled(what: str, time: float, told: float, found: float, order: float) -> str:
-    name, of = ("rate", "value") if order == 1 else ("second derivative", "rate")
-    return (
-        f"{what}: its Python function tells a {name} of {told:.4g} at t = {time:.6g} s, where its {of} changes by "
-        f"{found:.4g} in a second: correct it, or take a formula or fd.table, which know theirs"
-    )
 
 
 def _astray(driver: Driver | PointDriver, off: float) -> str:
