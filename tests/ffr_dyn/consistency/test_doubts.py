@@ -360,7 +360,7 @@ def test_the_line_of_a_point_on_it_is_that_of_the_first_body(markers, told):
 
 
 def swinging(length: float) -> list[str]:
-    """Notes on joints of two bars that swing from the horizontal, in forty steps to the time in which one falls its length."""
+    """Notes on open joints of two bars that swing from the horizontal, by forty steps to the root of length over gravity."""
     mass, time = 1.0, float(np.sqrt(length / 9.81))
     inertia = mass * length**2 / 12 * np.array([1e-3, 1.0, 1.0])
     rod = rigid_body("rod", mass=mass, inertia=inertia, points={"a": (-length / 2, 0, 0), "b": (length / 2, 0, 0)})
