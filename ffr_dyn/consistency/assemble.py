@@ -7,6 +7,7 @@ alone wherever rigid motion suffices. (Haug 1989, ch. 4.)
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from numbers import Real
 
 import numpy as np
 
@@ -37,7 +38,7 @@ from ffr_dyn.variants.plane import AXES, obstacles, planar_forms
 from ffr_prep.body import mesh_doubt, shear_doubt, steady_stress_doubt, units_doubts
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.brief import Brief
-from ffr_prep.common.errors import InputError
+from ffr_prep.common.errors import InputError, require_kind
 
 _MOST_GRAVITY = 1000.0  # m/s^2; in mm/s^2 that of the Earth is 9810
 SHIFTED = 1e-6  # m, rad, from where it is told that assembly moved a body
@@ -85,6 +86,7 @@ def assemble(scene: Scene, *, time: float = 0.0) -> Assembled:
     >>> x = fd.assemble(scene).x
     """
     require_scene(scene)
+    require_kind(time, Real, "the time to assemble a scene for", "seconds, such as 0.0")
     declared, flat = scene, flat_form(scene, time)
     scene, rows, place = flat.scene, flat.rows, flat.rows.place
     left_out = [note for b, body in enumerate(scene.bodies) for note in check_dropped(body, place.active(b))]
