@@ -60,7 +60,7 @@ from ffr_dyn.scene.scene import Scene
 from ffr_dyn.scene.surfaces import surface_of
 from ffr_prep.body import Surface
 from ffr_prep.common.arrays import Array
-from ffr_prep.common.errors import ComputationError, InputError
+from ffr_prep.common.errors import ComputationError, InputError, require_kind
 
 LOOKS = 10  # of a quantity that adds up, from row to row, where the method chooses its steps
 SURE = 10.0  # times, by which an evaluation may take longer than is guessed before the first one
@@ -181,7 +181,8 @@ def _writer(path: str | Path, scene: Scene, run: _Run, header: dict[str, Any], m
 
 def check_output_step(output_step: float) -> None:
     """Raises InputError for one that is none."""
-    if not isinstance(output_step, Real) or not 0 < output_step < np.inf:
+    require_kind(output_step, Real, "the output step", "seconds, such as 0.01")
+    if not 0 < output_step < np.inf:
         raise InputError(f"the output step is {output_step} s; it must be positive and finite")
 
 

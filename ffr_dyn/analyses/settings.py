@@ -5,11 +5,13 @@ what they say.
 from __future__ import annotations
 
 from dataclasses import KW_ONLY, dataclass, field, fields
+from numbers import Real
 from typing import Any
 
 from ffr_dyn.analyses.registry import OfMoment, OverTime, analysis
 from ffr_dyn.integrators import Integrator, Within
 from ffr_dyn.integrators.stabilisation import Projection, Stabilisation
+from ffr_prep.common.errors import require_kind
 
 
 @dataclass(frozen=True)
@@ -38,6 +40,8 @@ class Settings:
     start, end : of the time [s];  output_step : between rows [s];  outputs : names or patterns of the quantities to keep
     method, stabilisation : of analyses that integrate;  chart : of forward dynamics
 
+    Raises InputError for times that are no numbers.
+
     >>> result = fd.run(scene, fd.Settings(start=0.0, end=1.0, output_step=0.01, method=fd.ROS2(1e-3)))
     """
 
@@ -51,6 +55,10 @@ class Settings:
     analysis: OverTime = field(default_factory=lambda: analysis("forward")())
     chart: Charted = Charted()
 
+    def __post_init__(self) -> None:
+        for name in ("start", "end", "output_step"):
+            require_kind(getattr(self, name), Real, name, "seconds, such as 0.1")
+
     @property
     def span(self) -> dict[str, Any]:
         """The times and what to keep, as the functions of analyses take them."""
@@ -61,6 +69,8 @@ class Settings:
 class MomentSettings:
     """An analysis at one `time` [s].
 
+    Raises InputError for a time that is no number.
+
     >>> result = fd.run(scene, fd.MomentSettings(analysis=fd.Static()))
     """
 
@@ -68,6 +78,9 @@ class MomentSettings:
     time: float = 0.0
     outputs: tuple[str, ...] = ("default",)
     analysis: OfMoment = field(default_factory=lambda: analysis("static")())
+
+    def __post_init__(self) -> None:
+        require_kind(self.time, Real, "time", "seconds, such as 0.1")
 
     @property
     def span(self) -> dict[str, Any]:

@@ -13,6 +13,7 @@ from ffr_dyn.scene.drivers import Driver, PointDriver
 from ffr_dyn.scene.forces.places import OnJoint
 from ffr_dyn.scene.joints import Joint
 from ffr_dyn.scene.scene import Body, Scene, require_scene
+from ffr_prep.common.errors import InputError
 
 
 def scene_at(scene: Scene, result: Result, row: int = -1) -> Scene:
@@ -20,10 +21,14 @@ def scene_at(scene: Scene, result: Result, row: int = -1) -> Scene:
 
     Springs, stops and servos on angles keep the whole turns that they have counted by then.
 
-    Raises InputError where the result has not the bodies' R, p, v and omega_bar, or the angle of such a force.
+    Raises InputError for a row that the result has not, and where it lacks the bodies' R, p, v and omega_bar, or the angle
+    of such a force.
 
     >>> later = fd.scene_at(scene, result)  # as it is at the end
     """
+    rows = len(result.time)
+    if not -rows <= row < rows:
+        raise InputError(f"the result has no row {row}; give one of 0 to {rows - 1}, or -1 for the last")
     return replace(
         scene,
         bodies=tuple(_body_at(body, result, row) for body in scene.bodies),

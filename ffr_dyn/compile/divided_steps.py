@@ -16,6 +16,7 @@ from ffr_dyn.functions.breaks import begins
 from ffr_dyn.functions.fast_changes import Changes, Made, divisions, fast_changes, made_of, slow
 from ffr_dyn.functions.poles import pole
 from ffr_dyn.functions.time_functions import USER
+from ffr_dyn.functions.told_rates import misled, wrong_rate
 from ffr_dyn.kernels.functions import sample_functions
 from ffr_dyn.kernels.tables import SINCE, UNTIL
 from ffr_prep.common.arrays import Array
@@ -76,17 +77,26 @@ def fast_of(system: System, start: float, end: float, output_step: float, step: 
     """What functions of time do within steps [s] from `start` to `end`; None where they do nothing there.
 
     A Python function that changes all the time, as noise does, is left as it is called.
-    Raises ComputationError where functions that are written change many times in every step, InputError where one of them
-    grows without bound.
+    Raises ComputationError where functions that are written change many times in every step and where Python functions tell
+    rates that are not theirs, which look as if they changed; InputError where a written one grows without bound.
     """
-    functions = system.model.functions
-    made = made_of(functions.kind, functions.start, functions.data, system.model.rows.function, functions.switches)
-    if not 0 < end - start < np.inf or slow(made, functions.kind, functions.start, step):
+    if not 0 < end - start < np.inf:
         return None  # what is no span the run tells
     rows = _times(start, end, output_step)
+    _refuse_wrong_rates(system, rows)
+    functions = system.model.functions
+    made = made_of(functions.kind, functions.start, functions.data, system.model.rows.function, functions.switches)
+    if slow(made, functions.kind, functions.start, step):
+        return None
     found = _with_python(system, made, rows, step) or _written(system, made, rows, step)
     _refuse_poles(system, made, found, (start, end, step))
     return _named(system, found, step)
+
+
+def _refuse_wrong_rates(system: System, rows: Array) -> None:
+    for callback in system.user.callbacks:
+        if not callback.with_state and (wrong := wrong_rate(partial(of_time, callback), rows, min(callback.sizes) - 1)):
+            raise ComputationError(misled(callback.what, *wrong))
 
 
 def too_fast(system: System, start: float, end: float, step: float) -> list[str]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from numbers import Real
 
 import numpy as np
 
@@ -49,7 +50,7 @@ from ffr_prep.body import (
 )
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.brief import Brief
-from ffr_prep.common.errors import InputError
+from ffr_prep.common.errors import InputError, require_kind
 
 _AMONG = 6  # free vibrations of a whole, of which one is the slowest of its parts
 _SAME_DAMPING = 0.2  # of a ratio
@@ -99,6 +100,7 @@ def assemble(scene: Scene, *, time: float = 0.0) -> Assembled:
     >>> x = fd.assemble(scene).x
     """
     require_scene(scene)
+    require_kind(time, Real, "the time to assemble a scene for", "seconds, such as 0.0")
     declared, flat = scene, flat_form(scene, time)
     scene, rows, place = flat.scene, flat.rows, flat.rows.place
     left_out = [note for b, body in enumerate(scene.bodies) for note in check_dropped(body, place.active(b))]

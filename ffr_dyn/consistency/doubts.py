@@ -18,10 +18,10 @@ from ffr_dyn.compile.scene_tables import System, of_time
 from ffr_dyn.consistency.assemble import Assembled
 from ffr_dyn.consistency.evaluation import evaluate, evaluator
 from ffr_dyn.consistency.explicit_forces import candidates, fastest, told
-from ffr_dyn.consistency.following import jump_of, row_named, torn_open, unfollowed
+from ffr_dyn.consistency.following import beyond_one, jump_of, row_named, torn_open, unfollowed
 from ffr_dyn.consistency.validity import extremes, meaningless, strained, unstiffened
 from ffr_dyn.equations.inertia import kept_integrals, mass_matrix
-from ffr_dyn.functions.told_rates import wrong_rate
+from ffr_dyn.functions.told_rates import misled, wrong_rate
 from ffr_dyn.integrators import Integrator
 from ffr_dyn.integrators.stabilisation import Projection, Stabilisation
 from ffr_dyn.kernels.tables import MOMENT, OPENED, PHI, Record, Work
@@ -196,14 +196,17 @@ def between_rows(seen: Seen, system: System, work: Work, rows: Record | None = N
     if lost := torn_open(system, work, step) if rows is None else unfollowed(system, work, step, rows):
         return {APART: [lost.text]}
     if not opened > seen.tolerance:
-        return {}
+        return {}  # whichever row it is
     block, word = row_named(system, int(work.drift[OPENED]))
+    tolerance = seen.tolerance * beyond_one(system.scene, word)
+    if not opened > tolerance:
+        return {}
     if word.function is not None and (jump := jump_of(block, word, time - method.step, time)):
         return {OPEN: [jump]}
     return {
         OPEN: [
             f"at t = {time:.6g} s the row '{word.text}' of {block.name!r} is open by {opened:.2g} at the end of a step, "
-            f"before it is projected, and that is more than {seen.tolerance:.1g}; use a smaller step"
+            f"before it is projected, and that is more than {tolerance:.1g}; use a smaller step"
         ]
     }
 
@@ -240,7 +243,7 @@ def _found(seen: Seen) -> dict[str, list[str]]:
         **_constraints(seen, quick),
         ASTRAY: [
             *(
-                _misled(callback.what, *wrong)
+                misled(callback.what, *wrong)
                 for callback, wrong in zip(seen.assembled.system.user.callbacks, seen.arrays["told"].T, strict=True)
                 if wrong[-1]
             ),
@@ -259,23 +262,18 @@ def _found(seen: Seen) -> dict[str, list[str]]:
 def _constraints(seen: Seen, quick: list[str]) -> dict[str, list[str]]:
     value, time, number = seen.arrays["open"]
     if not value > seen.tolerance:
-        return {}
+        return {}  # whichever row it is
     blocks = (seen.assembled.all_rows or seen.assembled.system).blocks
-    block, text = [(block, word.text) for block in blocks for word in block.words][int(number)]
+    block, word = [(block, word) for block in blocks for word in block.words][int(number)]
+    larger = beyond_one(seen.scene, word)
+    if not value > seen.tolerance * larger:
+        return {}
     change = "use a smaller step" if seen.apart < np.inf else "use projection, or a smaller step"
-    where = f"at t = {time:.6g} s the row '{text}' of {block.name!r} is open by {value:.2g}"
-    if value > seen.apart:
+    where = f"at t = {time:.6g} s the row '{word.text}' of {block.name!r} is open by {value:.2g}"
+    if value > seen.apart * larger:
         what = "the driver is not followed" if block.driver else "the mechanism has come apart"
         return {APART: [f"{where}: {what}; {quick[0] if quick else change}"]}
-    return {OPEN: [f"{where}, the most of all, and more than {seen.tolerance:.1g}; {change}"]}
-
-
-def _misled(what: str, time: float, told: float, found: float, order: float) -> str:
-    name, of = ("rate", "value") if order == 1 else ("second derivative", "rate")
-    return (
-        f"{what}: its Python function tells a {name} of {told:.4g} at t = {time:.6g} s, where its {of} changes by "
-        f"{found:.4g} in a second: correct it, or take a formula or fd.table, which know theirs"
-    )
+    return {OPEN: [f"{where}, the most of all, and more than {seen.tolerance * larger:.1g}; {change}"]}
 
 
 def _astray(driver: Driver | PointDriver, off: float) -> str:

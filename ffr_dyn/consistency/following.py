@@ -144,6 +144,11 @@ def _whole(scene: Scene, word: Word) -> float:
     return _length(scene) if _unit(word) == "m" else 1.0
 
 
+def beyond_one(scene: Scene, word: Word) -> float:
+    """How many times what a row of a scene of one metre may be open by one of this scene may: lengths of larger ones more."""
+    return max(1.0, _whole(scene, word))
+
+
 def _length(scene: Scene) -> float:
     """[m] of the largest body, which may be a point."""
     return max(body.model.size for body in scene.bodies) or 1.0

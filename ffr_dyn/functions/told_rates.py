@@ -55,5 +55,14 @@ def wrong_rate(function: Callable[[float], Array], times: Array, order: int) -> 
     return None
 
 
+def misled(what: str, time: float, told: float, found: float, order: float) -> str:
+    """A `WrongRate` in words; what : has the function."""
+    name, of = ("rate", "value") if order == 1 else ("second derivative", "rate")
+    return (
+        f"{what}: its Python function tells a {name} of {told:.4g} at t = {time:.6g} s, where its {of} changes by "
+        f"{found:.4g} in a second: correct it, or take a formula or fd.table, which know theirs"
+    )
+
+
 def _nearer(told: Array, before: Array, behind: Array) -> Array:
     return np.where(np.abs(before - told) < np.abs(behind - told), before, behind)

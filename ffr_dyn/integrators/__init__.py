@@ -9,7 +9,7 @@ Twin: none, declarations.
 from __future__ import annotations
 
 from difflib import get_close_matches
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar, Protocol, runtime_checkable
 
 from ffr_dyn.integrators.dopri5 import DormandPrince as DormandPrince
 from ffr_dyn.integrators.generalised_alpha import HHT as HHT
@@ -27,6 +27,7 @@ from ffr_dyn.kernels.integrator_api import CompiledFunction
 from ffr_prep.common.errors import InputError
 
 
+@runtime_checkable
 class Integrator(Protocol):
     """The protocol of a method of `forward`.
 

@@ -19,7 +19,7 @@ import numpy as np
 
 from ffr_dyn.kernels.tables import Record
 from ffr_dyn.linear.step_tangents import SAMPLES, periods_of_product, product_of_steps
-from ffr_dyn.linear.turn_map import Turns, after, deviation, mapped, monodromy, placed
+from ffr_dyn.linear.turn_map import OWN_PERIOD, Turns, after, deviation, mapped, monodromy, placed
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError
 
@@ -220,5 +220,6 @@ def _by_newton(of: Turns, known: _Known, periods: float) -> Returned:
         s = s + np.linalg.lstsq(np.eye(s.size) - M, image - s, rcond=1e-10)[0]
     raise ComputationError(
         f"no motion of period {of.period:.6g} s was found: after {NEWTONS} of Newton's steps a period still ends {left:.2g} "
-        "of the scene's size from where it began; give a period that fits drivers and loads, or begin nearer to the motion"
+        "of the scene's size from where it began; give a period that fits drivers and loads, or begin nearer to the motion; "
+        f"{OWN_PERIOD}"
     )

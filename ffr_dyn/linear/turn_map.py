@@ -37,6 +37,9 @@ CLOSED = 1e-13  # of constraints, relative to the scene: what is left open kicks
 DIFFERENCE = 1e-5  # rad, or relative to the scene; of derivatives of a period, which are extrapolated
 LATER = 0.37  # s: when a driver is asked again whether it turns evenly
 CORRECTIONS, MET = 12, 1e-13  # of a deviation onto the constraints, and of rows, relative to their sizes
+OWN_PERIOD = (
+    "a vibration that excites itself makes its own period: run `forward` until it has settled, and measure it there"
+)
 AGAIN = 0.5  # rad, or the scene's size: of deviations beyond which a state does not count as come back
 
 
@@ -153,7 +156,7 @@ def deviation(of: Turns, x: Array, v: Array) -> Array:
         raise ComputationError(
             f"after a period of {of.period:.6g} s the scene is not where it began: the period is not that of its drivers and "
             "loads, or a body goes on turning (give another period), or bodies swing up to the speed of what drives them "
-            "(give them its velocity)"
+            f"(give them its velocity); {OWN_PERIOD}"
         )
     return np.concatenate([near.W.T @ y, near.W.T @ (V - near.V)])
 

@@ -43,6 +43,10 @@ _TITLE_WIDTH = 13
 _FRONTS = {"z": np.array([0.0, 0.0, 1.0]), "y": np.array([0.0, -1.0, 0.0]), "x": np.array([1.0, 0.0, 0.0])}
 _CORNERS = (np.array([0.0, -1.0, 0.75]), np.array([0.75, 0.0, 1.0]), np.array([0.75, -1.0, 0.0]))
 _BATCH = 400_000  # points times moments
+_ARM, _DOT = (
+    0.3,
+    1e-3,
+)  # of the largest radius of gyration: of the cross of a body; of it, what extends no farther is a dot
 
 
 @dataclass(frozen=True, eq=False)
@@ -451,8 +455,12 @@ def _link(result: Result, name: str, times: Array) -> Link:
     if len(markers) < 2:
         histories.insert(0, result[f"{name}.R"])
     points = np.stack([_at(times, result.time, history, name) for history in histories], axis=1)
-    R = _at(times, result.time, result[f"{name}.R"], name)
-    return Link(name, points, _spanning_tree(points[0]), R, _rotations(times, result, name))
+    R, A = _at(times, result.time, result[f"{name}.R"], name), _rotations(times, result, name)
+    arm = _ARM * result.attributes.get("length", 0.0)
+    if np.ptp(points, axis=1).max(initial=0.0) < _DOT * arm:  # which shows neither place nor rotation
+        cross = np.vstack([np.zeros(3), np.eye(3), -np.eye(3)])
+        points = points[:, :1] + arm * np.einsum("fij,kj->fki", A, cross)
+    return Link(name, points, _spanning_tree(points[0]), R, A)
 
 
 def _spanning_tree(points: Array) -> Array:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ffr_dyn.pictures.bode import labelled
 from ffr_dyn.pictures.histories import PALETTE, drawing
 from ffr_dyn.results.result import Result
 
@@ -23,14 +24,15 @@ def draw_forced(result: Result, path: str | Path) -> Path:
     beside[:-1] |= ~stable[1:]
     with drawing(path, (10.0, 6.0)) as figure:
         axes = figure.subplots()
-        for k, name in enumerate(result.attributes["outputs"]):
+        for k, name in enumerate(labelled(result)):
             amplitude, color = result["amplitude"][:, k], PALETTE[k % len(PALETTE)]
             axes.plot(f, np.where(stable, amplitude, np.nan), color=color, label=name)
             axes.plot(f, np.where(beside, amplitude, np.nan), ":", color=color)
         for jump in result.attributes["jumps"]:
             axes.axvline(jump, color="0.7", linewidth=0.8, zorder=0)
         axes.set_ylim(bottom=0)
-        axes.set_ylabel(f"amplitude under {result.attributes['input']} of {result.attributes['input_amplitude']:g}")
+        a = result.attributes
+        axes.set_ylabel(f"amplitude under {a['input']} of {a['input_amplitude']:g} {a.get('input_unit', '')}".rstrip())
         axes.set_xlabel("frequency [Hz]")
         axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.02))
     return Path(path)

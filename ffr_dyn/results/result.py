@@ -23,7 +23,7 @@ import numpy as np
 from ffr_prep.body import Surface
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.brief import Brief, Rows, cut, listed
-from ffr_prep.common.errors import InputError
+from ffr_prep.common.errors import InputError, require_kind
 from ffr_prep.common.outputs import replacing
 
 # netCDF names: a letter, digit or underscore first, no "/", no control character, no blank at the end.
@@ -177,6 +177,7 @@ class Result(Brief):
 
     def quantity(self, name: str) -> Quantity:
         """The quantity of that name, or one component of it as a quantity. InputError suggests close names."""
+        require_kind(name, str, "the name of a quantity", "one such as 'rod.tip.position'")
         found = self._find(name)
         if found is None:
             of_it = [one for one in self.quantities if one.startswith(f"{name}.")]  # of a body, a marker, a joint

@@ -39,7 +39,19 @@ FORCE = Along("N", "N m")
 STIFFNESS = Along("N/m", "N m/rad or N m")
 DAMPING = Along("N s/m", "N m s/rad or N m s")
 RATE = Along("m/s", "rad/s")
-COULOMB = Along("N or 1", "N m or m")
+
+
+@dataclass(frozen=True)
+class Friction:
+    """A force where the field `normal` is left at 1, and else what the normal force is multiplied by."""
+
+    def of(self, entry: Mapping[str, Any]) -> str:
+        if "normal" not in entry:
+            return Along("N or 1", "N m or m").of(entry)
+        return (Along("N", "N m") if entry["normal"] == 1.0 else Along("1", "m")).of(entry)
+
+
+COULOMB = Friction()
 
 
 @dataclass(frozen=True)

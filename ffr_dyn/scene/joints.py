@@ -22,7 +22,7 @@ from ffr_dyn.scene.checks import check_markers, check_own_name
 from ffr_dyn.scene.fields import Direction, In, OfTime
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.brief import Brief
-from ffr_prep.common.errors import InputError
+from ffr_prep.common.errors import InputError, require_kind
 
 # The words: each has its readable form in `ffr_dyn.equations.constraints` and its kernel in `ffr_dyn.kernels.rows`.
 COINCIDENCE, DOT_1, DOT_2 = "coincidence", "dot-1", "dot-2"
@@ -204,6 +204,7 @@ def register_joint(
 
     >>> fd.register_joint("pin-in-slot", pin_in_slot, coordinates=("angle",))
     """
+    require_kind(kind, str, "the kind of a joint", "its name, such as 'pin-in-slot'")
     if kind in KINDS and KINDS[kind].__qualname__ != sentence.__qualname__:
         raise InputError(f"there is a kind of joint {kind!r} already; give the other one another name")
     KINDS[kind], COORDINATES[kind], NEEDS[kind] = sentence, coordinates, needs

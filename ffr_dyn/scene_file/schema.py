@@ -125,7 +125,7 @@ FIELDS: dict[str, Any] = {
     "Event.direction": Literal["rising", "falling", "either"],
 }
 
-DECIDE = ("coordinate", "first", "second")  # fields on which units of others depend; they are read first
+DECIDE = ("coordinate", "normal", "first", "second")  # fields on which units of others depend; they are read first
 
 # Fields that a file cannot hold: Python functions, and the name, which is the key of the entry.
 NOT_IN_FILES = ("name", "function")

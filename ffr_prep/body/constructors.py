@@ -12,6 +12,7 @@ import numpy as np
 from ffr_prep.body.reduced import BeamForces, BodyError, FlexibleBody, Interface, Surface, axial
 from ffr_prep.body.second_order import pair_values, recoordinated
 from ffr_prep.common.arrays import Array, ArrayLike
+from ffr_prep.common.errors import require_kind
 
 MOVED_POINTS = "moved_points"  # of the provenance: where points were asked for that have no surface near
 _OFF = 0.05  # of the size of a body: how far from its place a point is put without a word
@@ -35,7 +36,8 @@ def rigid_body(
 
     >>> crank = fd.rigid_body("crank", mass=1.2, inertia=[1e-3, 1e-3, 2e-3], points={"pin": (0.05, 0, 0)})
     """
-    if not isinstance(mass, Real) or not 0 < mass < np.inf:
+    require_kind(mass, Real, f"body {name!r}: mass", "kilograms, such as 1.2")
+    if not 0 < mass < np.inf:
         raise BodyError(f"body {name!r}: mass is {mass} kg; it must be positive")
     if not isinstance(points, Mapping | None):
         raise BodyError(f"body {name!r}: points is {points!r}; give them by name, such as {{'pin': (0, 0, 0)}}")

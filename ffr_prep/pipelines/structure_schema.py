@@ -33,6 +33,18 @@ Point = tuple[Metres, Metres, Metres]
 Vector = tuple[float, float, float]
 
 
+def _named_material(value: Any) -> Any:
+    """Refuses its constants where the name of a material belongs."""
+    if not isinstance(value, str):
+        raise ValueError(
+            'names a material: one of the library, such as "steel", or of a table [materials.NAME] with E, nu and rho'
+        )
+    return value
+
+
+MaterialName = Annotated[str, BeforeValidator(_named_material)]
+
+
 class RectangleEntry(Strict):
     """A solid rectangle.
 
@@ -135,7 +147,7 @@ class MemberEntry(Strict):
     """
 
     section: SectionEntry
-    material: str
+    material: MaterialName
     orientation: Vector | None = None
     offset: tuple[Metres, Metres] = (0.0, 0.0)
     shear: bool = True
@@ -150,7 +162,7 @@ class ShellEntry(Strict):
     """
 
     thickness: Metres
-    material: str
+    material: MaterialName
     rotary_inertia: bool = True
 
 
@@ -306,7 +318,7 @@ class SolidEntry(Strict):
     """
 
     file: Path
-    material: str | dict[str, str]
+    material: MaterialName | dict[str, MaterialName]
     interfaces: dict[str, InterfaceEntry] = Field(min_length=1)
     unit: Literal["m", "cm", "mm", "in"] | None = None
     size: float | None = None

@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from numbers import Real
 from pathlib import Path
 from typing import Any
 
@@ -92,8 +93,10 @@ def _drawable(body: FlexibleBody, numbers: Sequence[int]) -> Surface:
 
 def _factor(surface: Surface, k: int, scale: float | str) -> float:
     if scale != "auto":
-        if not (np.isfinite(float(scale)) and float(scale) != 0):
-            raise InputError(f"the scale of the mode shapes is {scale}; it must be a number other than zero, or 'auto'")
+        if not (isinstance(scale, Real) and np.isfinite(scale) and scale != 0):
+            raise InputError(
+                f"the scale of the mode shapes is {scale!r}; it must be a number other than zero, or 'auto'"
+            )
         return float(scale)
     largest = np.linalg.norm(surface.Phi[:, :, k - 1], axis=1).max()
     return float(_LARGEST * np.linalg.norm(np.ptp(surface.points, axis=0)) / largest)

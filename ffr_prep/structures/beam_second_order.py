@@ -9,8 +9,13 @@ element goes on along
 to second order: it shortens by what its slopes take of the length, its slopes are not quite the rotation vector, and this
 twists where the section does not.
 
-The section forces of pairs are those of the ends, K e_ij + F_ij: of the strains of second order, which are those of axes that
-turn with the sections.
+The section forces of pairs are those of the ends, K e_ij + F_ij: of the strains of second order, which are those of
+axes that turn with the sections. In these axes moments are in equilibrium by
+
+    dM/dx + kappa x M + e_x x F = 0,
+
+so a beam that is bent and twisted has kappa x M in its shear forces, beside the slope of its moments that the ends know.
+It is taken in the middle of each element, as the slope is the mean over it.
 
 Source: as `ffr_prep.structures.beam_stiffening`.
 """
@@ -25,7 +30,7 @@ from ffr_prep.body import Surface
 from ffr_prep.body.accelerations import turned
 from ffr_prep.common.arrays import Array
 from ffr_prep.structures.beam_stiffening import end_forces_of_products, strain_functions, turned_offsets
-from ffr_prep.structures.beam_stress import at_places, stiffness_of_ends, stressed_sweep
+from ffr_prep.structures.beam_stress import at_places, section_forces, stiffness_of_ends, stressed_sweep
 from ffr_prep.structures.beam_surface import swept_surface
 from ffr_prep.structures.beams import Beams, axis_functions, element_coordinates, picked
 from ffr_prep.structures.frame import Frame
@@ -51,7 +56,7 @@ def second_stressed_sweep(frame: Frame, elements: Beams, nodal: Array, one: Arra
         frame,
         elements,
         lambda own, xi, across: _moved(picked(elements, own), xi, across, nodal[own], one[own], others[own]),
-        at_places(_end_forces(elements, nodal, one, others)),
+        _section_forces(elements, nodal, one, others),
     )
 
 
@@ -148,6 +153,22 @@ def _end_forces(elements: Beams, nodal: Array, one: Array, others: Array) -> Arr
     """(E, 12, m) forces of pairs on the ends of the centroid line, in axes that turn with the sections."""
     linear = stiffness_of_ends(elements) @ _of_line(elements, nodal, one, others)
     return np.asarray(linear + end_forces_of_products(elements, one, others))
+
+
+def _section_forces(elements: Beams, nodal: Array, one: Array, others: Array) -> Array:
+    """(E, 3, 6, m) section forces of pairs, in axes that turn with the sections."""
+    forces = at_places(_end_forces(elements, nodal, one, others))
+    (M, kappa), (of_others, kappa_others) = (_moments(elements, of) for of in (one, others))
+    turning = _cross(kappa, of_others) + _cross(kappa_others, M)
+    forces[:, :, 1] -= turning[:, None, 2]
+    forces[:, :, 2] += turning[:, None, 1]
+    return forces
+
+
+def _moments(elements: Beams, nodal: Array) -> tuple[Array, Array]:
+    """(E, 3, m) moments of first order in the middle of the elements, and the curvatures of the axis that they make."""
+    M = section_forces(elements, nodal)[:, 1, 3:]
+    return M, M / np.stack([elements.GJ, elements.EIy, elements.EIz], axis=1)[..., None]
 
 
 def _cross(a: Array, b: Array) -> Array:

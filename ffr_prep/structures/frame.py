@@ -232,10 +232,12 @@ def triangulated(frame: Frame) -> Frame:
 def joined(*frames: Frame) -> Frame:
     """One frame of several: nodes at the same place become one, and beams and plates meet there rigidly.
 
-    Raises InputError for coordinates that are not finite.
+    Raises InputError without a frame.
 
     >>> tower = fp.joined(legs, braces)
     """
+    if not frames:
+        raise InputError("joined() joins frames, and has none; give one or more, as in joined(legs, braces)")
     points = np.vstack([frame.points for frame in frames])
     first = np.cumsum([0, *(len(frame.points) for frame in frames)])
     kept, new = _merged(points)

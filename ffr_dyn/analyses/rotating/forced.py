@@ -135,13 +135,15 @@ def forced(
     _check(amplitude, band_of, steps, harmonics, about)
     at = about_state(scene, about, 0.0)
     acts = acting(at, input, 0.0)
-    names = components(at, outputs, 0.0, "forced")
+    units = components(at, outputs, 0.0, "forced")
+    names = tuple(units)
     of, notes = _wave(at, acts, amplitude, steps, band_of)
     still = returned(of.at(band_of[0], 0.0))
     *_, first = branch(over_amplitude(of, band_of[0]), begun(of, still.x, still.v))
     found = list(branch(over_frequency(of, *band_of), first.u))
     motions = [_motion(of, acts, one, names) for one in found]
-    result = _as_result(scene, found, np.array(motions), names, harmonics, told(acts, input), amplitude, notes)
+    said = {**told(acts, input, units, names), "input_amplitude": amplitude}
+    result = _as_result(scene, found, np.array(motions), names, harmonics, said, notes)
     if path is not None:
         save_result(result, path)
     return result
@@ -192,8 +194,8 @@ def _motion(of: Wave, acts: Acting, at: Solution, names: Sequence[str]) -> Array
 
 
 def _as_result(
-    scene: Scene, found: list[Solution], motions: Array, names: Sequence[str], harmonics: int, words: str,
-    amplitude: float, notes: Sequence[str],
+    scene: Scene, found: list[Solution], motions: Array, names: Sequence[str], harmonics: int, said: dict[str, Any],
+    notes: Sequence[str],
 ) -> Result:  # fmt: skip
     frequency = np.exp(np.array([one.p for one in found]))
     growth = np.array([_growth(one) for one in found])
@@ -217,8 +219,7 @@ def _as_result(
         **described(scene),
         "analysis": "forced vibration",
         "method": "periodic motions, followed by pseudo-arclength",
-        "input": words,
-        "input_amplitude": amplitude,
+        **said,
         "outputs": list(names),
         "jumps": jumps,
         "losses": _losses(frequency, growth, folds(np.log(frequency), arc)),

@@ -7,8 +7,9 @@ two, divided by (i w)^order.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 from ffr_dyn.analyses.efforts import Effort, JointEffort, MarkerEffort, with_function
 from ffr_dyn.analyses.linearise import BASE
@@ -118,23 +119,35 @@ def _released(scene: Scene, driver: Driver, time: float) -> Scene:
     return replace(left, forces=(*left.forces, added))
 
 
-def components(scene: Scene, outputs: Sequence[str], time: float, who: str) -> tuple[str, ...]:
-    """Every component of the outputs. InputError where there are none."""
+def components(scene: Scene, outputs: Sequence[str], time: float, who: str) -> dict[str, str]:
+    """Every component of the outputs, and its unit as far as it is known here. InputError where there are none."""
     from ffr_dyn.analyses.assemble import assembly
 
     if not outputs or isinstance(outputs, str):
         raise InputError(f"{who} needs outputs: names of quantities in a list, such as rod.tip.acceleration")
     known = assembly(scene, time=time, outputs=("*",))
-    found: list[str] = []
+    found: dict[str, str] = {}
     for name in outputs:
+        of = known.quantities.get(name) or known.quantities.get(name.rpartition(".")[0])
         try:
-            found += known.components([name])
+            found |= dict.fromkeys(known.components([name]), of.unit if of else "")
         except InputError:
-            found.append(name)  # another quantity, which who asks for it knows, or names what is near
-    return tuple(found)
+            found[name] = ""  # another quantity, which who asks for it knows, or names what is near
+    return found
 
 
-def allowed(of: Acting, names: Sequence[str]) -> Sequence[str]:
+def _unit(of: Acting) -> str:
+    """The unit of the input, which of a load is a share."""
+    if of.driver is not None or of.order is not None:
+        angle = of.driver is not None and of.driver.coordinate == "angle"
+        return ("rad" if angle else "m") + ("", "/s", "/s^2")[of.order or 0]
+    if isinstance(of.effort, str):
+        return "m/s^2" if of.effort in BASE else "1"
+    turning = of.effort.coordinate == "angle" if isinstance(of.effort, JointEffort) else of.effort.moment
+    return "N m" if turning else "N"
+
+
+def allowed(of: Acting, names: Iterable[str]) -> Iterable[str]:
     """The outputs. InputError for what the driver exerts in whose place the input acts, but its effort."""
     for name in names:
         if of.in_place_of and name.startswith((f"{of.in_place_of}.", f"{of.in_place_of}_held.")) and name != of.own:
@@ -153,8 +166,15 @@ def absolute_order(effort: str | Effort, name: str) -> int | None:
     return ABSOLUTE.get(head.rpartition(".")[2]) if axis == effort[-1] else None
 
 
-def told(of: Acting, given: str | Effort) -> str:
-    """The input in words, those that were given where they say it best."""
+def told(of: Acting, given: str | Effort, units: Mapping[str, str], outputs: Sequence[str]) -> dict[str, Any]:
+    """Attributes of a result: the input in words, its unit, and those of outputs, of which most are known."""
+    own = _unit(of)
+    found = [own if name == of.own else units[name] for name in outputs]
+    return {"input": _in_words(of, given), "input_unit": own, "output_units": found}
+
+
+def _in_words(of: Acting, given: str | Effort) -> str:
+    """Those that were given where they say it best."""
     effort = of.effort
     if of.driver or isinstance(effort, str):
         return str(given)

@@ -151,11 +151,10 @@ def response(
     noise, asked = checked_noise(psd), _checked(frequencies, band_of)
     at = about_state(scene, about, time)
     acts = acting(at, input, time)
-    names = (*allowed(acts, components(acts.scene, outputs, time, "response")), *acts.moved)
+    units = components(acts.scene, outputs, time, "response")
+    names = (*allowed(acts, units), *acts.moved)
     linear, sides = _linear(acts, at, names, time)
-    low, high = band_of if band_of else (None, None)
-    if noise.size and not band_of:
-        low, high = noise[0, 0] or None, noise[-1, 0]
+    low, high = band_of or ((noise[0, 0] or None, noise[-1, 0]) if noise.size else (None, None))
     f = asked if asked.size else band(linear.eigenvalues, low, high)
     if acts.order and not f.min() > 0:
         raise InputError(f"frequencies {list(frequencies)}: at 0 Hz a velocity has no displacement; give positive ones")
@@ -165,7 +164,7 @@ def response(
         linear = replace(linear, notes=(*linear.notes, *beside(linear, sides, some, linear.outputs, acts.order or 0)))
     power, notes = _mean_square(linear, sides, noise, acts.order or 0)
     linear = replace(linear, notes=(*linear.notes, *notes_of_gains(linear, found), *notes))
-    result = _as_result(scene, linear, found, told(acts, input), noise, power, time)
+    result = _as_result(scene, linear, found, told(acts, input, units, linear.outputs), noise, power, time)
     if path is not None:
         save_result(result, path)
     return result
@@ -276,7 +275,7 @@ def _by_motion(
 
 
 def _as_result(
-    scene: Scene, linear: Linearisation, found: Transfer, words: str, psd: Array, power: Array, time: float
+    scene: Scene, linear: Linearisation, found: Transfer, said: dict[str, Any], psd: Array, power: Array, time: float
 ) -> Result:
     outputs = Axis("of", tuple(name.replace(".", " ") for name in linear.outputs))
     names = _mode_names(linear, found)
@@ -303,7 +302,7 @@ def _as_result(
         **described(scene),
         "analysis": "frequency response",
         "method": "linearised",
-        "input": words,
+        **said,
         "outputs": list(linear.outputs),
         "modes": names,
         "notes": list(linear.notes),

@@ -84,7 +84,9 @@ class Bushing(Force):
     @property
     def stiffness_matrix(self) -> Array:
         """(6, 6) linear stiffness; zero where a curve is given."""
-        return self._six_by_six([0.0 if isinstance(k, Curve) else k for k in self.stiffness], "stiffness")
+        given = self.stiffness
+        numbers = [0.0 if isinstance(k, Curve) else k for k in given] if np.ndim(given) == 1 else given
+        return self._six_by_six(numbers, "stiffness")
 
     @property
     def damping_matrix(self) -> Array:

@@ -25,11 +25,12 @@ class JointFriction(Force):
 
     joint : name of the joint
     coordinate : "angle" or "stroke"
-    coulomb : friction force [N] with normal = 1, or coefficient of friction with `normal` [N] (times radius for an angle)
+    coulomb : without `normal` the friction force [N], of an angle the torque [N m]; with `normal` [N] the coefficient of
+              friction [1], of an angle times the radius on which the surfaces slide [m]
     normal  : a number not below zero, a time function or a Python function of time, below zero while the surfaces are
               apart. It is given: the joint's reaction does not enter
     creep   : [m/s]; a load below friction is not held but creeps, at creep atanh(load / coulomb)
-    static  : friction at rest, in the unit of coulomb [N or 1], not below it: both, with stribeck, or neither
+    static  : friction at rest, in the unit of coulomb, not below it: both, with stribeck, or neither
     stribeck : velocity [m/s] over which friction falls from static to coulomb (Stribeck 1902)
     viscous : force over the rate [N s/m]
 

@@ -5,7 +5,7 @@ Source: M. P. Castanier, Y.-C. Tan, C. Pierre, AIAA Journal 39 (2001) 1182-1187.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.linalg
@@ -16,6 +16,7 @@ from ffr_prep.model.coupled import CoupledModel
 from ffr_prep.reduction.basis import Basis, check_interfaces
 from ffr_prep.reduction.methods.craig_bampton import with_fixed_interfaces
 from ffr_prep.reduction.modes import constraint_modes
+from ffr_prep.reduction.selected_modes import cut_pair
 from ffr_prep.reduction.selection import Selection, UpTo, check_selection
 from ffr_prep.solvers.factor import FreeBody, supported
 
@@ -46,13 +47,14 @@ class CharacteristicModes:
         check_interfaces(model, "a reduction of the interfaces")
         fixed = supported(body, model.C)
         shapes, stiffness = constraint_modes(model, fixed)
-        kept = _condensed_modes(stiffness, shapes.T @ (model.M @ shapes), self.interface_modes)
+        omega2, kept = _condensed_modes(stiffness, shapes.T @ (model.M @ shapes), self.interface_modes)
         condensed = shapes @ kept, kept.T @ stiffness @ kept
-        return with_fixed_interfaces(model, body, L, fixed, self.modes, lambda: condensed)
+        found = with_fixed_interfaces(model, body, L, fixed, self.modes, lambda: condensed)
+        return replace(found, warnings=(*found.warnings, *cut_pair(omega2, kept.shape[1] - 6, "interface modes")))
 
 
-def _condensed_modes(K: Array, M: Array, selection: int | UpTo) -> Array:
-    """(6I, 6 + count) the six rigid motions and the lowest elastic modes of the condensed body."""
+def _condensed_modes(K: Array, M: Array, selection: int | UpTo) -> tuple[Array, Array]:
+    """omega2 (6I - 6,) of the condensed body's elastic modes; (6I, 6 + count) its rigid motions and the lowest of them."""
     scale = 1 / np.sqrt(np.diag(M))
     omega2, V = scipy.linalg.eigh(K * np.outer(scale, scale), M * np.outer(scale, scale))
     elastic = len(omega2) - 6
@@ -62,4 +64,4 @@ def _condensed_modes(K: Array, M: Array, selection: int | UpTo) -> Array:
         count = selection
     if not 0 <= count <= elastic:
         raise InputError(f"asked for {count} interface modes; the interfaces have {elastic}: ask for 0 to {elastic}")
-    return scale[:, None] * V[:, : 6 + count]
+    return omega2[6:], scale[:, None] * V[:, : 6 + count]

@@ -107,7 +107,7 @@ PARTS = {
     "results/file.py": ("_damaged",),
     "analyses/energy.py": ("_told", "_cause"),
     "analyses/inversion/internal_dynamics.py": ("_unfit",),
-    "consistency/doubts.py": ("_misled",),
+    "functions/told_rates.py": ("misled",),
     "consistency/explicit_forces.py": ("told",),
     "consistency/failure.py": ("_locks", "_overflow", "_unconverged"),
     "consistency/validity.py": ("meaningless",),

@@ -74,6 +74,19 @@ def test_a_driver_needs_its_own_rate(rate):
         fd.kinematic(scene, end=0.5, output_step=0.1)
 
 
+def test_a_search_for_a_step_begins_with_the_rates():
+    """Of few calls; before, a rate that is not the function's looked as if it changed all the time."""
+    calls = []
+
+    def swing(t: float) -> tuple[float, float, float]:
+        calls.append(t)
+        return np.sin(3 * t), 6 * np.cos(3 * t), -18 * np.sin(3 * t)
+
+    with pytest.raises(fd.ComputationError, match="tells a rate of"):
+        fd.forward(wheel(drivers=(fd.Driver("d", "axle", swing),)), end=2.0, output_step=0.01)
+    assert len(calls) < 500
+
+
 def test_a_servo_that_damps_needs_the_rate_of_its_target():
     """0.2 c'' = 5 (3 cos 3t - c') + 10 (sin 3t - c); the rate was taken as zero."""
 

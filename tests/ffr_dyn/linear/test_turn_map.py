@@ -272,3 +272,22 @@ def test_a_four_bar_whose_vibrations_coarse_steps_do_not_follow(speed):
     how = {"output_step": period / 100, "method": fd.ROS3(found.attributes["step"]), "check": False}
     run = fd.forward(scene, end=3 * period, begin="periodic", stabilisation=fd.Projection(1e-14), **how)
     np.testing.assert_allclose(run["coupler.q"][-101:], found["coupler.q"], rtol=0, atol=1e-8 * size)
+
+
+def test_a_vibration_that_excites_itself_is_sent_to_a_forward_run():
+    """Van der Pol's oscillator, started on its cycle but for the period."""
+    cart = fd.rigid_body("cart", mass=1.0, inertia=(0.1, 0.1, 0.1), points={"a": (0, 0, 0)})
+    pull = fd.Actuator(
+        "pull",
+        "rail",
+        coordinate="stroke",
+        function=lambda t, now: (1 - now.position("cart.a")[0] ** 2) * now.velocity("cart.a")[0],
+    )
+    scene = fd.Scene(
+        bodies=[fd.Body("cart", cart, position=(2.0, 0, 0))],
+        joints=[fd.Joint("rail", "translational", "ground.w", "cart.a", axis=(1, 0, 0))],
+        ground={"w": (0, 0, 0)},
+        forces=[fd.JointSpring("spring", "rail", stiffness=1.0, coordinate="stroke"), pull],
+    )
+    with pytest.raises(fd.ComputationError, match="excites itself makes its own period: run `forward` until"):
+        fd.periodic(scene, period=6.6, method=fd.ROS3(0.066))

@@ -178,6 +178,21 @@ def test_a_single_marker_is_joined_to_the_origin_of_the_body():
     assert link.pairs.tolist() == [[0, 1]]
 
 
+def test_a_body_whose_markers_are_at_one_place_is_a_cross_along_its_axes():
+    """A dot would show nothing of its rotation."""
+    result = pendulum_of_markers()
+    for name in ("tip", "root", "quarter", "middle"):
+        result = without(result, f"arm.{name}.position")
+    (dot,) = film(result, 11).links
+    assert len(np.unique(dot.points[4], axis=0)) == 1
+    (link,) = film(replace(result, attributes={**result.attributes, "length": 0.5}), 11).links
+    arms = link.points[4] - result["arm.R"][4]
+    assert sorted(map(tuple, link.pairs.tolist())) == [(0, k) for k in range(1, 7)]
+    np.testing.assert_allclose(np.linalg.norm(arms[1:], axis=1), 0.15, rtol=1e-12)
+    np.testing.assert_allclose(arms[1:4], 0.15 * link.A[4].T, atol=1e-15)
+    np.testing.assert_allclose(arms[4:], -arms[1:4], atol=1e-15)
+
+
 def test_time_and_scale_are_written_with_fitting_digits():
     shown = film(rotating_box(), 5, scale=20)
     assert [shown.clock(k) for k in (0, 1)] == ["0.00 s", "0.25 s"]

@@ -349,7 +349,10 @@ def notched(what: str) -> object:
     return linearise(scene, outputs=("measured.notch",))
 
 
-SEEN = [Case(p(notched, "von-mises"), p(notched, "xx"))]
+SEEN = [
+    Case(p(notched, "von-mises"), p(notched, "xx")),
+    Case(lambda: fd.scene_at(HINGED, fd.assembly(HINGED), 5), lambda: fd.scene_at(HINGED, fd.assembly(HINGED), -1)),
+]
 
 
 def stopped(step: float) -> Result:

@@ -18,6 +18,7 @@ from test_animate import rotating_box
 
 import ffr_prep as fp
 from ffr_dyn.analyses.integration import integrate
+from ffr_dyn.analyses.static import static
 from ffr_dyn.cli import cli
 from ffr_dyn.functions.time_functions import harmonic, polynomial
 from ffr_dyn.integrators import ROS2
@@ -39,6 +40,7 @@ from ffr_dyn.results.stress import (
 from ffr_dyn.results.stress_error import stress_error
 from ffr_dyn.scene.described import described
 from ffr_dyn.scene.drivers import Driver
+from ffr_dyn.scene.forces import Load
 from ffr_dyn.scene.joints import Joint
 from ffr_dyn.scene.scene import Body, Scene
 from ffr_dyn.scene.stress_sensors import (
@@ -61,7 +63,7 @@ from ffr_prep.reduction.methods.eigenmodes import Eigenmodes
 from ffr_prep.reduction.methods.inertia_relief import InertiaRelief
 from ffr_prep.reduction.methods.union import Union
 from ffr_prep.structures.frame import Member, named, polyline
-from ffr_prep.structures.sections import rectangle
+from ffr_prep.structures.sections import circle, rectangle
 
 PAIRS = ([0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2])
 
@@ -405,6 +407,25 @@ def test_a_spinning_ring_has_its_hoop_stress():
     along = np.stack([-y, x, 0 * x], axis=1) / np.hypot(x, y)[:, None]
     hoop = np.einsum("pk,pkl,pl->p", along, matrices(stress), along)
     np.testing.assert_allclose(hoop, STEEL.rho * SPIN**2 * radius**2, rtol=0.01)
+
+
+def test_the_shear_of_a_rod_that_is_bent_and_twisted_is_the_force_in_turned_axes():
+    """A force F across the end of a rod under the torque T: its sections turn by T x / GJ, and away from the force."""
+    section, length, elements, force, torque = circle(0.012), 1.0, 16, 1.0, 0.4
+    frame = polyline([(0, 0, 0), (length, 0, 0)], Member(section, STEEL), elements=elements)
+    rod = fp.reduce(
+        fp.from_frame(
+            named(frame, root=(0, 0, 0), tip=(length, 0, 0)), [InterfaceRegion("root"), InterfaceRegion("tip")]
+        ),
+        fp.Request(name="rod", reference=FixedTo("root"), reduction=CraigBampton(20), stress=True),
+    )
+    load = Load("l", "rod.tip", force=(0, force, 0), moment=(torque, 0, 0))
+    clamp = (Joint("clamp", "fixed", "ground.O", "rod.root"),)
+    result = static(Scene((Body("rod", rod),), clamp, loads=(load,), ground={"O": (0, 0, 0)}))
+    shear = np.array([section_forces(result, "rod", k)[-1, 1, 1:3] for k in range(elements)])
+    twist = torque * (np.arange(elements) + 0.5) / elements * length / (STEEL.E / (2 + 2 * STEEL.nu) * section.J)
+    np.testing.assert_allclose(shear[:, 0], force, rtol=1e-4)
+    np.testing.assert_allclose(shear[:, 1], -force * twist, atol=0.03 * force * twist[-1])
 
 
 def test_section_forces_of_a_sagging_cantilever_and_the_reaction_of_its_joint(tmp_path):

@@ -162,3 +162,26 @@ def test_the_unit_of_a_driver_a_coupling_and_an_event_is_that_of_what_they_name(
     bushing = {"kind": "bushing", "i": "ground.a", "j": "rod.b", "stiffness": [1, 1, 1, 1, 1, 1]}
     assert not refused("forces", bushing, "stiffness", ["1 N/mm", 1, 1, "3 N m/rad", 1, 1])
     assert refused("forces", bushing, "stiffness", ["1 N m/rad", 1, 1, 1, 1, 1])
+
+
+@pytest.mark.parametrize(
+    ("coordinate", "normal", "fits", "else_where"),
+    [
+        ("stroke", {}, "5 N", "5 N m"),
+        ("stroke", {"normal": 100.0}, "0.3", "5 N"),
+        ("stroke", {"normal": "100 N"}, "0.3", "5 N"),
+        ("stroke", {"normal": {"formula": "100 + t"}}, "0.3", "5 N"),
+        ("angle", {}, "5 N m", "3 mm"),
+        ("angle", {"normal": "100 N"}, "3 mm", "5 N m"),
+    ],
+)
+def test_dry_friction_beside_a_normal_force_is_a_coefficient(coordinate, normal, fits, else_where):
+    friction = {"kind": "joint-friction", "joint": "j", "creep": 1e-3, "coulomb": 0.1, "stribeck": 0.1, "static": 9.0}
+
+    def said(key: str, value: str) -> set[Any]:
+        entry = {**friction, "coordinate": coordinate, key: value, **normal}
+        return complaints({"bodies": {}, "analysis": {"kind": "assemble"}, "forces": {"f": entry}})
+
+    for key in ("coulomb", "static"):
+        assert said(key, fits) == said(key, "0.3")
+        assert any("does not fit: this is given in" in text for _, text in said(key, else_where))

@@ -288,6 +288,10 @@ def test_ties_that_cannot_be(tmp_path, old, new, says):
         (LINE.replace("d = 0.01", "d = -0.01"), "bar.toml: section circle -0.01 m: d is -0.01 m"),
         (LINE.replace('member = "bar"', 'member = "rod"'), "there is no member 'rod'; there are: 'bar'"),
         (LINE.replace('"steel"', '"stel"'), "no material 'stel' in the library; did you mean steel"),
+        (
+            LINE.replace('"steel"', "{E = 2e11}"),
+            r"bar.material: names a material.*of a table \[materials.NAME\] with E, nu",
+        ),
         (LINE.replace("b = [1, 0, 0]", "b = [1, 0, 1]"), "no node at .* to be called 'b'"),
         (LINE + 'kind = "soft"', "interfaces.b.kind: must be 'rigid' or 'mean'"),
         ("reduction = {modes = -1}\n" + LINE, "reduction.modes: must be greater than or equal to 0"),

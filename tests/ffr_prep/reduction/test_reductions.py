@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -411,3 +412,45 @@ def test_krylov_at_a_natural_frequency_is_refused():
     natural = np.sqrt(Eigenmodes(1).basis(model, body, functionals(MeanAxis(), model)).omega2[0]) / (2 * np.pi)
     with pytest.raises(ComputationError, match="natural frequency"):
         Krylov(1, (float(natural),)).basis(model, body, functionals(MeanAxis(), model))
+
+
+# ---- pairs of equal frequency -----------------------------------------------------------------------------------------
+
+
+def reduced_bar(section: fp.Section, reduction: fp.Reduction) -> fp.FlexibleBody:
+    line = fp.polyline([(0, 0, 0), (1, 0, 0)], fp.Member(section, STEEL, (0, 1, 0)), elements=12)
+    frame = fp.named(line, a=(0, 0, 0), b=(1, 0, 0))
+    model = fp.from_frame(frame, [fp.InterfaceRegion("a"), fp.InterfaceRegion("b")])
+    return fp.reduce(model, fp.Request(name="bar", reference=FixedTo("a"), reduction=reduction))
+
+
+def of_pairs(body: fp.FlexibleBody) -> list[str]:
+    return [warning for warning in body.provenance["warnings"] if "pair" in warning]
+
+
+@pytest.mark.parametrize(
+    ("reduction", "says"),
+    [
+        (CraigBampton(3), ["normal modes, 3, cuts a pair .* ask for 4, or for 2"]),
+        (CraigBampton(4), []),
+        (CraigBampton(0), []),
+        (Eigenmodes(1), ["normal modes, 1, cuts a pair .* ask for 2$"]),
+        (Rubin(5), ["normal modes, 5, cuts a pair"]),
+        (Union((CraigBampton(3), InertiaRelief())), ["normal modes, 3, cuts a pair"]),
+        (CharacteristicModes(2, 3), ["interface modes, 3, cuts a pair .* ask for 4, or for 2"]),
+        (CharacteristicModes(2, 4), []),
+    ],
+)
+def test_numbers_of_modes_that_cut_a_pair_are_told(reduction, says):
+    warnings = of_pairs(reduced_bar(fp.circle(0.02), reduction))
+    assert len(warnings) == len(says)
+    for warning, words in zip(warnings, says, strict=True):
+        assert re.search(words, warning)
+    assert of_pairs(reduced_bar(fp.rectangle(0.02, 0.03), reduction)) == []
+
+
+def test_an_accuracy_keeps_pairs():
+    for tolerance in np.geomspace(0.3, 0.01, 4):
+        body = reduced_bar(fp.rectangle(0.02, 0.02), CraigBampton(Accuracy(Band(1.0, 300.0), tolerance)))
+        bending = body.frequencies[:4].reshape(2, 2)
+        np.testing.assert_allclose(bending[:, 0], bending[:, 1], rtol=1e-9)

@@ -87,6 +87,7 @@ FRAMES = [
     Case(p(fp.polyline, LINE, MEMBER, elements=0), p(fp.polyline, LINE, MEMBER, elements=1)),
     Case(p(fp.panel, LINE, SHEET, elements=(1, 1)), p(fp.panel, SQUARE, SHEET, elements=(1, 1))),
     Case(p(fp.panel, SQUARE, SHEET, elements=(0, 1)), p(fp.panel, SQUARE, SHEET, elements=(1, 1))),
+    Case(fp.joined, p(fp.joined, FRAME)),
     Case(p(fp.named, FRAME, a=(np.nan, 0, 0)), p(fp.named, FRAME, a=(0.5, 0, 0))),
     Case(p(fp.named, FRAME, a=(0.3, 0, 0)), p(fp.named, FRAME, a=(0.5, 0, 0))),
     changed(elements=np.zeros((0, 2), int), member_of=[]),
