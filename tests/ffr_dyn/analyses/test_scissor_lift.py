@@ -25,7 +25,7 @@ def lift(stages: int) -> Scene:
     bodies = [Body("foot", foot, position=(c, 0, 0))]
     joints = [
         Joint("guide", "translational", "ground.o", "foot.p", axis=(1, 0, 0)),
-        Joint("on foot", "revolute", "foot.p", "d0.b"),
+        Joint("foot_pin", "revolute", "foot.p", "d0.b"),
         Joint("base", "revolute", "ground.o", "u0.a"),
     ]
     for k in range(stages):
