@@ -88,10 +88,10 @@ from ffr_dyn.kernels.tables import (
 )
 from ffr_dyn.kernels.vectors import add_scaled, copy, fill, product
 
-PASSES, UNMOVED = (
-    60,
-    1e-15,
-)  # at most, where rows depend on one another; and of accelerations, what the last one changes
+PASSES = 60  # at most, where rows depend on one another
+UNMOVED = 1e-15  # of accelerations, what the last pass changes
+ENOUGH = 1e-22  # of the square of what is left, where the last pass ends
+CONTRADICTED = 1e-9  # of what is left with what rows contradict one another by, below which it is rounding of that
 GROSS = 1.0  # m, -: of a violation that no projection puts right
 SETTLING, SETTLED = 60, 1e-11  # iterations with a damping matrix, and the relative change at which they end
 UNMET = 1e3  # tolerances, beyond which a violation that the projection does not take back is no drift
@@ -318,17 +318,19 @@ def refine(r, target):
     copy(way_acc, z_acc)
     copy(way_rate, z_rate)
     above = -product(z, z_rate)
+    enough = ENOUGH * above
     for _ in range(PASSES):
         project(r, way_rate)
         gather_rows(starts, rw.step, q)
         below = product(way_rate, q)
-        if not (above > 0.0 and below > 0.0):
+        if not (above > max(enough, CONTRADICTED * product(rw.left, z)) and below > 0.0):
             break
         share = above / below
         add_scaled(rw.lam, rw.lam, share, way)
         add_scaled(bw.more, bw.more, share, way_acc)
         if share * largest(way_acc) <= UNMOVED * largest(bw.more):
             break
+        add_scaled(rw.left, rw.left, share, way_rate)
         add_scaled(z, z, share, q)
         add_scaled(z_acc, z_acc, share, bw.acc)
         miss(r, z_acc, z, z_rate)

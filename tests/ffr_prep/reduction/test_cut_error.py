@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from boxes import STEEL, box_mesh
 
-from ffr_prep.body import cut_errors_of, free_vibrations, truncated
+from ffr_prep.body import FlexibleBody, cut_errors_of, free_vibrations, truncated
 from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.cuts import CutPlane
 from ffr_prep.model.reference import FixedTo, MeanAxis
@@ -51,10 +51,15 @@ def rod() -> Frame:
     return named(polyline([(0, 0, 0), (2, 0, 0)], BAR, elements=16), left=(0, 0, 0), right=(2, 0, 0))
 
 
+def about_cuts(body: FlexibleBody) -> list[str]:
+    """Warnings about cuts; the square bar's number of modes cuts pairs of equal frequency, which is another matter."""
+    return [text for text in body.provenance["warnings"] if "cut" in text and "pair of equal frequency" not in text]
+
+
 def test_a_beam_in_parts_is_as_stiff_as_in_one_piece():
     body = in_parts(rod(), 4)
     assert max(cut_errors_of(body.provenance)) < 1e-4
-    assert not body.provenance["warnings"]
+    assert not about_cuts(body)
     assert "cut error   frequencies of the free body too high by less than 0.01 %" in "\n".join(body_lines(body))
 
 
@@ -99,7 +104,7 @@ def test_stress_beside_a_cut_is_told_of_solids_alone():
     assert 0.67 < von_mises(tension[cut]).min() < 0.8
     middle = np.isclose(first.surface.points[:, 0], 0.25)
     np.testing.assert_allclose(von_mises(tension[middle]), 1.0, atol=0.02)
-    assert not any("cut" in warning for warning in in_parts(rod(), 2, stress=True).provenance["warnings"])
+    assert not about_cuts(in_parts(rod(), 2, stress=True))
 
 
 def test_bodies_of_hardly_any_shapes():
