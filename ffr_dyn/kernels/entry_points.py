@@ -7,6 +7,8 @@ says otherwise; where something failed `work.info[FAILED]` says where. Those tha
 Twin: `ffr_dyn.equations.motion.equations_of_motion`.
 """
 
+import numpy as np
+
 from ffr_dyn.kernels.bodies import add_product, mass_times, normalise, reduce_forces
 from ffr_dyn.kernels.forces.applied import apply_loads, call_user, count_loads, gravity_field, keep_measured, power
 from ffr_dyn.kernels.forces.implicit import add_to_joints, keep_growth, set_targets, subtract_yield
@@ -88,7 +90,7 @@ from ffr_dyn.kernels.tables import (
 )
 from ffr_dyn.kernels.vectors import add_scaled, copy, fill, product
 
-PASSES = 60  # at most, where rows depend on one another
+PASSES = 1000  # at most, where rows depend on one another, beyond which their reactions are not known
 UNMOVED = 1e-15  # of accelerations, what the last pass changes
 ENOUGH = 1e-22  # of the square of what is left, where the last pass ends
 CONTRADICTED = 1e-9  # of what is left with what rows contradict one another by, below which it is rounding of that
@@ -302,7 +304,8 @@ def miss(r, acc, lam, out):
 def refine(r, target):
     """Take out again what relaxation of the multiplier matrix S does to a solution: conjugate residuals of S lam = b, which
     the relaxed matrix preconditions (Saad 2003, 6.8). Each pass takes out one direction in which S is less than the
-    relaxation, of which a long row of links has some. What rows contradict one another by has no part in them.
+    relaxation, of which a long row of links has some. What rows contradict one another by has no part in them. Multipliers
+    that are not found are not a number.
     """
     bw, rw, starts = r.work.bodies, r.work.rows, r.model.rows.start
     z, z_rate, way, way_rate, q = rw.search[0], rw.search[1], rw.search[2], rw.search[3], rw.search[4]
@@ -338,6 +341,8 @@ def refine(r, target):
         add_scaled(way, z, above / before, way)
         add_scaled(way_acc, z_acc, above / before, way_acc)
         add_scaled(way_rate, z_rate, above / before, way_rate)
+    else:
+        fill(rw.lam, np.nan)
     copy(bw.acc, bw.more)
 
 

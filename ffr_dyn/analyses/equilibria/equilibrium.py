@@ -23,7 +23,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg import LinAlgWarning, eigvalsh_tridiagonal, ldl, lu_factor, lu_solve
 
-from ffr_dyn.analyses.equilibria.relaxation import Rest, may_rest, relaxed
+from ffr_dyn.analyses.equilibria.relaxation import Rest, relaxed
 from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.consistency.evaluation import locked, total_mass_matrix, unit_rows
 from ffr_dyn.equations.forces_at_rest import is_load
@@ -102,7 +102,7 @@ def equilibrium(
     found = _newton(problem, start, 1.0, SOON)
     if found.found:
         return found
-    if mechanism() and may_rest(system, time, x, sizes) and (rest := relaxed(system, time, x, sizes)) is not None:
+    if mechanism() and (rest := relaxed(system, time, x, sizes)) is not None:
         return _from_rest_on(problem, rest, found)
     found = _newton(problem, start, 1.0, ITERATIONS)
     return found if found.found else _by_load_steps(problem, start, found)

@@ -53,23 +53,17 @@ class _Fall:
     sound: bool
 
 
-def may_rest(system: System, time: float, x: Array, sizes: Array) -> bool:
-    """Whether the scene is let go at all: something moves it, and what does stays the same as time goes on."""
-    scale = _time_scale(system, time, x, sizes)
-    if not np.isfinite(scale):
-        return False
-    at, still = evaluator(system), np.zeros(system.layout.v_size)
-    now, *later = (accelerations(at, time + share * scale, x, still) for share in (0.0, *LATER))
-    return all(np.array_equal(now, other) for other in later)
-
-
 def relaxed(system: System, time: float, x: Array, sizes: Array) -> Rest | None:
-    """The way to rest from positions x at a time [s]; None where there is none, as of a stone that falls for ever.
+    """The way to rest from positions x at a time [s]; None where nothing moves, where what moves it changes with time, and
+    where there is no rest, as of a stone that falls for ever.
 
     sizes : (V,) of what counts as a motion of one
     """
-    first, at_rest = FIRST_STEP * _time_scale(system, time, x, sizes), np.zeros(sizes.size)
-    step, highest, endless, way, v, reference = first, 0.0, 0, [x[None]], at_rest, system.model.loads.initial
+    scale, at_rest = _time_scale(system, time, x, sizes), np.zeros(sizes.size)
+    if not np.isfinite(scale):
+        return None
+    first = step = FIRST_STEP * scale
+    highest, endless, way, v, reference = 0.0, 0, [x[None]], at_rest, system.model.loads.initial
     for _ in range(FALLS):
         fall = _fall(system, time, way[-1][-1], v, reference, step)
         endless = endless + 1 if fall.sound and not fall.ended else 0
@@ -87,12 +81,19 @@ def relaxed(system: System, time: float, x: Array, sizes: Array) -> Rest | None:
 
 
 def _time_scale(system: System, time: float, x: Array, sizes: Array) -> float:
-    """[s] in which the fastest part moves by its size from rest; infinite where nothing moves, or nothing is determined."""
+    """[s] in which the fastest part moves by its size from rest; infinite where nothing moves, where accelerations are not
+    determined, and where they change with time."""
+    at, still = evaluator(system), np.zeros(sizes.size)
     try:
-        fastest = np.abs(accelerations(evaluator(system), time, x, np.zeros(sizes.size)) / sizes).max()
+        now = accelerations(at, time, x, still)
+        fastest = float(np.abs(now / sizes).max())
+        if not fastest > 0:
+            return float("inf")
+        scale = fastest**-0.5
+        later = [accelerations(at, time + share * scale, x, still) for share in LATER]
     except ComputationError:
         return float("inf")
-    return float(1.0 / np.sqrt(fastest)) if fastest > 0 else float("inf")
+    return scale if all(np.array_equal(now, other) for other in later) else float("inf")
 
 
 def _fall(system: System, time: float, x: Array, v: Array, reference: Array, step: float) -> _Fall:
