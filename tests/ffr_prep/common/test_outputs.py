@@ -185,7 +185,19 @@ def test_a_full_disk_leaves_what_was_there(tmp_path, body_file):
 # ---- signals and processes -----------------------------------------------------------------------------------------
 
 
+@pytest.fixture
+def heard():
+    """Signals that a shell has told its background jobs to ignore, as it does with SIGINT, are heard like others."""
+    names = [one for one in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP) if signal.getsignal(one) is signal.SIG_IGN]
+    for one in names:
+        signal.signal(one, signal.SIG_DFL)
+    yield
+    for one in names:
+        signal.signal(one, signal.SIG_IGN)
+
+
 @pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
+@pytest.mark.usefixtures("heard")
 def test_signals_raise_and_wait_for_what_must_be_done_whole(name):
     done = []
     handler = signal.getsignal(getattr(signal, name))
