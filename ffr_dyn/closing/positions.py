@@ -21,6 +21,7 @@ from ffr_prep.common.errors import InputError
 TOLERANCE = 1e-11  # of Phi [m, -] and of its rate
 ITERATIONS = 100
 LARGEST_TURN = 0.5  # rad per iteration
+ROUNDED = 1e-3  # of the size of the scene, what stays open where numbers have few digits
 FARTHEST = 1e4  # times what is open: how far a body is turned to close it while bodies can deform instead
 
 
@@ -61,10 +62,15 @@ def _open(constraints: Constraints, rows: RowsAt) -> InputError:
             f"the mechanism cannot be assembled: the points of joint {name!r} coincide, and the line between them, of no "
             "length, has no direction; place its bodies apart"
         )
+    left = f"the mechanism cannot be assembled: joint {name!r} stays open by {abs(rows.Phi[at]):.3g}"
+    if abs(rows.Phi[at]) < ROUNDED * length_of(constraints.scene):
+        return InputError(
+            f"{left}, as where joints fix the same twice and their numbers are rounded: give positions and axes with all "
+            "their digits, or fix each thing once, such as by a spherical joint and a point-on-line for two revolute joints"
+        )
     return InputError(
-        f"the mechanism cannot be assembled: joint {name!r} stays open by {abs(rows.Phi[at]):.3g} after {ITERATIONS} "
-        "iterations; check the positions of the interfaces, the lengths of the bodies and the axes of the joints, or start "
-        "closer"
+        f"{left} after {ITERATIONS} iterations; check the positions of the interfaces, the lengths of the bodies and the "
+        "axes of the joints, or start closer"
     )
 
 

@@ -36,6 +36,7 @@ from ffr_dyn.scene.parts import owner, wholes
 from ffr_dyn.scene.scene import Body, Scene, altered, length_of, measured_body, require_scene
 from ffr_dyn.scene.sensors import Measurement
 from ffr_dyn.variants.aligned import levelled
+from ffr_dyn.variants.in_line import in_line
 from ffr_dyn.variants.mean_axis import in_mean_axis_frames
 from ffr_dyn.variants.plane import AXES, obstacles, planar_forms
 from ffr_prep.body import (
@@ -120,7 +121,7 @@ def assemble(scene: Scene, *, time: float = 0.0) -> Assembled:
     ] + left_out
     if found.singular:
         notes.insert(0, BRANCHES)
-    notes = shifted(scene, place, guess, x) + _slowed(scene, place, given, v) + notes
+    notes = flat.notes + shifted(scene, place, guess, x) + _slowed(scene, place, given, v) + notes
     if scene.plane != "none" and any(body.model.n for body in scene.bodies):
         notes.append(
             f"the scene is planar (normal {scene.plane}): computed in the plane, with in-plane modes without their rounding "
@@ -290,11 +291,13 @@ def _movable(place: Layout) -> int:
 
 @dataclass(frozen=True)
 class Flat:
-    """A scene as it is computed, its rows, and whether it is computed in the plane or in space, in words."""
+    """A scene as it is computed, its rows, whether it is computed in the plane or in space, in words, and notes on what was
+    moved by a hair."""
 
     scene: Scene
     rows: Constraints
     computed: str
+    notes: list[str]
 
 
 def flattened(scene: Scene, time: float) -> tuple[Scene, list[Block]]:
@@ -312,16 +315,17 @@ def flat_form(scene: Scene, time: float) -> Flat:
 
 
 def _in_plane_or_space(scene: Scene, time: float) -> Flat:
-    scene, found = in_mean_axis_frames(scene), dict[str, str]()
+    found = dict[str, str]()
+    scene, notes = in_line(in_mean_axis_frames(scene))
     blocks = blocks_of(scene)  # which know joints and markers by number, and these are the same in a plane
     for flat in planar_forms(scene):
         across, found[flat.plane] = rows_across(flat, blocks, time)
         if not found[flat.plane] or scene.plane == flat.plane:
             said = ", as the scene says" * (scene.plane == flat.plane)
             rows = constraints_of(flat, without(blocks, across), time)
-            return Flat(flat, rows, f"in the plane, normal {flat.plane}{said}")
+            return Flat(flat, rows, f"in the plane, normal {flat.plane}{said}", notes)
     whole = altered(scene, plane="none")
-    return Flat(whole, constraints_of(whole, blocks, time), _in_space(scene, found))
+    return Flat(whole, constraints_of(whole, blocks, time), _in_space(scene, found), notes)
 
 
 def _in_space(scene: Scene, found: dict[str, str]) -> str:

@@ -410,6 +410,14 @@ def named(name: str) -> Quantity:
     return run(HINGED, end=0.01).quantity(name)
 
 
+def in_bearings(*kinds: str) -> object:
+    """A bar whose second bearing is a tenth of a millimetre off the line of the first."""
+    joints = [
+        Joint(end, kind, f"ground.{end}", f"bar.{end}", axis=(1, 0, 0)) for end, kind in zip("ab", kinds, strict=True)
+    ]
+    return assemble(replace(HINGED, joints=joints, ground={"a": (0, 0, 0), "b": (1, 0, 1e-4)}))
+
+
 def stepper(**more: object) -> Stepper:
     load = Load("push", "bar.b", force=(signal("push", 0.0), 0, 0))
     return Stepper(replace(HINGED, loads=(load,)), **{"method": ROS2(1e-3), **more})
@@ -708,6 +716,7 @@ INPUT = [
             ),
         ),
     ),
+    Case(p(in_bearings, "revolute", "revolute"), p(in_bearings, "spherical", "point-on-line")),
     Case(
         lambda: linearise(HINGED, inputs=(fd.JointEffort("m", "hing"),)),
         lambda: linearise(HINGED, inputs=(fd.JointEffort("m", "hinge"),)),
