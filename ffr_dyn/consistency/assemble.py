@@ -33,12 +33,11 @@ from ffr_dyn.functions.overshoots import overshoots
 from ffr_dyn.scene.followed import TURN
 from ffr_dyn.scene.force_kinds import forces_of
 from ffr_dyn.scene.parts import owner, wholes
-from ffr_dyn.scene.scene import Body, Scene, altered, length_of, measured_body, require_scene
+from ffr_dyn.scene.scene import Body, Scene, length_of, measured_body, require_scene
 from ffr_dyn.scene.sensors import Measurement
-from ffr_dyn.variants.aligned import levelled
 from ffr_dyn.variants.in_line import in_line
 from ffr_dyn.variants.mean_axis import in_mean_axis_frames
-from ffr_dyn.variants.plane import AXES, obstacles, planar_forms
+from ffr_dyn.variants.plane import level_in_space, obstacles, planar_forms
 from ffr_prep.body import (
     cut_doubt,
     cut_stress_doubt,
@@ -316,16 +315,17 @@ def flat_form(scene: Scene, time: float) -> Flat:
 
 def _in_plane_or_space(scene: Scene, time: float) -> Flat:
     found = dict[str, str]()
-    scene, notes = in_line(in_mean_axis_frames(scene))
-    blocks = blocks_of(scene)  # which know joints and markers by number, and these are the same in a plane
-    for flat in planar_forms(scene):
+    scene = in_mean_axis_frames(scene)
+    lined, notes = in_line(scene)
+    blocks = blocks_of(lined)  # which know joints and markers by number, and these are the same in a plane
+    for flat in planar_forms(lined):
         across, found[flat.plane] = rows_across(flat, blocks, time)
         if not found[flat.plane] or scene.plane == flat.plane:
             said = ", as the scene says" * (scene.plane == flat.plane)
             rows = constraints_of(flat, without(blocks, across), time)
             return Flat(flat, rows, f"in the plane, normal {flat.plane}{said}", notes)
-    whole = altered(scene, plane="none")
-    return Flat(whole, constraints_of(whole, blocks, time), _in_space(scene, found), notes)
+    whole, notes = in_line(level_in_space(scene))
+    return Flat(whole, constraints_of(whole, blocks_of(whole), time), _in_space(scene, found), notes)
 
 
 def _in_space(scene: Scene, found: dict[str, str]) -> str:
@@ -343,12 +343,8 @@ def in_space(scene: Scene) -> Scene:
 
 
 def seen_in_space(scene: Scene) -> Scene:
-    """As `in_space`. Where the scene is computed in a plane, places a hair beside it are put into it, so that redundant
-    joints close, and bodies that lack inertia across it have a trace of it."""
-    if scene.plane != "auto":
-        return scene
-    traced = with_traces(scene)
-    forms = {axis: levelled(traced, normal) for normal, axis in enumerate(AXES)}
-    if all(form is scene for form in forms.values()):
+    """As `in_space`. Where the scene is computed in a plane, bodies that lack inertia across it have a trace of it."""
+    if scene.plane != "auto" or (traced := with_traces(scene)) is scene:
         return in_space(scene)
-    return in_space(forms.get(_in_plane_or_space(scene, 0.0).scene.plane, scene))
+    planar = _in_plane_or_space(scene, 0.0).scene.plane != "none"
+    return in_space(traced if planar else scene)
