@@ -14,9 +14,10 @@ from scipy.linalg import qr
 from scipy.sparse import csr_array, vstack
 
 from ffr_dyn.closing.constraints import Constraints, RowsAt, of_blocks, rows_at, without
+from ffr_dyn.closing.dependent_rows import dependence_at
 from ffr_dyn.closing.going_on import going_on
 from ffr_dyn.closing.positions import TOLERANCE, close_positions, largest_turn, weights
-from ffr_dyn.closing.row_space import Dependence, Matrix, dependence, smallest_solution
+from ffr_dyn.closing.row_space import Dependence, Matrix, smallest_solution
 from ffr_dyn.compile.row_tables import moving_bodies
 from ffr_dyn.equations.constraint_rows import Block
 from ffr_dyn.equations.layout import Layout, meets, moved, to_body_axes, to_global_axes
@@ -45,7 +46,7 @@ class Independent(Brief):
 
 def independent_blocks(constraints: Constraints, x: Array, v: Array, rows: RowsAt) -> Independent:
     """The rows that the motion needs, of those given at (x, v). Raises InputError when a driver's row is redundant."""
-    here = _dependence_of(constraints, x, rows)
+    here = dependence_at(constraints, x, rows.J)
     in_motion = _in_motion(constraints, x, v, here)
     blocks, N, singular = list(constraints.blocks), in_motion.combinations, here.count > in_motion.count
     if drivers := _drivers_in(N, blocks):
@@ -137,12 +138,7 @@ def _at_neighbours(constraints: Constraints, x: Array, v: Array) -> Dependence |
 
 
 def _dependence(constraints: Constraints, x: Array, v: Array) -> Dependence:
-    return _dependence_of(constraints, x, rows_at(constraints, x, v))
-
-
-def _dependence_of(constraints: Constraints, x: Array, rows: RowsAt) -> Dependence:
-    J = rows.J
-    return dependence(J @ weights(constraints.scene, constraints.place, x, True, isinstance(J, np.ndarray)))
+    return dependence_at(constraints, x, rows_at(constraints, x, v).J)
 
 
 def _neighbour(constraints: Constraints, x: Array, v: Array, number: int, away: float) -> Array | None:

@@ -18,9 +18,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ffr_dyn.closing.constraints import Constraints, constraints_of, rows_at
+from ffr_dyn.closing.dependent_rows import dependence_at
 from ffr_dyn.closing.going_on import going_on
 from ffr_dyn.closing.positions import close_positions, close_velocities, weights
-from ffr_dyn.closing.row_space import dependence
 from ffr_dyn.compile.engine import Engine, new_engine, record_row
 from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.compile.workspace import new_record
@@ -241,7 +241,7 @@ def _stressed(constraints: Constraints, x: Array, r: Array) -> Array:
     lengths = np.maximum(np.linalg.norm(A, axis=1), 1e-300)
     owners = np.repeat(np.arange(len(constraints.blocks)), [len(block.words) for block in constraints.blocks])
     found = np.zeros((len(constraints.blocks), 6), dtype=bool)
-    for stress in dependence(A).combinations.T:
+    for stress in dependence_at(constraints, x, J).combinations.T:
         pulls = [(stress / lengths * (owners == k)) @ J for k in range(len(constraints.blocks))]
         wrenches = [_wrench(constraints, x, r, *each) for each in zip(constraints.blocks, pulls, strict=True)]
         found |= np.abs(wrenches) > STRESSED * np.abs(wrenches).max()

@@ -6,11 +6,9 @@ rows together do not: the mechanism knows nothing of it. So what the steps have 
 
 from __future__ import annotations
 
-import numpy as np
-
 from ffr_dyn.closing.constraints import constraints_of, rows_at
-from ffr_dyn.closing.positions import weights
-from ffr_dyn.closing.row_space import Dependence, dependence
+from ffr_dyn.closing.dependent_rows import dependence_at
+from ffr_dyn.closing.row_space import Dependence
 from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.kernels.tables import AT, FIRST_PASSED, LOW, LOW_AT, MOST_PASSED, PASSED, Work
 from ffr_prep.common.arrays import Array
@@ -52,5 +50,4 @@ def _of_all(system: System, all_rows: System, time: float, x: Array) -> bool:
 
 def _dependence(system: System, time: float, x: Array) -> Dependence:
     rows = constraints_of(system.scene, list(system.blocks), time)
-    J = rows_at(rows, x, 0.0 * rows.engine.v).J
-    return dependence(J @ weights(system.scene, rows.place, x, True, isinstance(J, np.ndarray)))
+    return dependence_at(rows, x, rows_at(rows, x, 0.0 * rows.engine.v).J)

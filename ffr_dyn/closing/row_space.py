@@ -83,6 +83,11 @@ def _dense_unit_rows(A: Array) -> tuple[Array, Array]:
     return A / length[:, None], length
 
 
+def row_lengths(A: Matrix) -> Array:
+    """(C,) the lengths of the rows, one where a row vanishes."""
+    return (_dense_unit_rows(A) if isinstance(A, np.ndarray) else _unit_rows(A))[1]
+
+
 def independent(A: Matrix) -> bool:
     """Whether the rows of A (C, V) are independent."""
     return dependence(A).count == 0

@@ -14,6 +14,7 @@ import numpy as np
 
 from ffr_dyn.closing.constraints import Constraints, constraints_of, rows_at, without
 from ffr_dyn.closing.coupled_turns import prescribed
+from ffr_dyn.closing.dependent_rows import held_by_next_to_nothing
 from ffr_dyn.closing.driven_angles import driven_angles, led_to_drivers
 from ffr_dyn.closing.going_on import going_on
 from ffr_dyn.closing.independence import independent_blocks
@@ -126,16 +127,28 @@ def assemble(scene: Scene, *, time: float = 0.0) -> Assembled:
             f"the scene is planar (normal {scene.plane}): computed in the plane, with in-plane modes without their rounding "
             "across it"
         )
+    share, weak = held_by_next_to_nothing(rows, x, here.J) if redundant else (0.0, [])
+    notes += _weakly_held(share, weak)
     notes += [*sliding_notes(scene), *_idle(scene), *_uncounted(rows, x), *body_doubts(scene)]
     notes += held_frequencies(
         declared, [(x[place.R(b)], x[place.p(b)]) for b in range(len(place.n))], scene.plane, time
     )
-    all_rows = compile_scene(scene, list(rows.blocks), RELAXATION) if redundant else None
+    all_rows = compile_scene(scene, list(rows.blocks), RELAXATION) if redundant and not weak else None
     free = _movable(place) - count
     system = compile_scene(scene, kept) if redundant else rows.engine.system
     notes += _beyond_tables(system)
     check_memory(system.user, time, x, v)
     return Assembled(system, all_rows, x, v, free, tuple(notes), tuple(redundant), flat.computed)
+
+
+def _weakly_held(share: float, joints: list[str]) -> list[str]:
+    """A note where joints strain bodies in a way in which these have next to no modes: reactions are those of the rows that
+    the motion needs, since all rows would take next to nothing for all that gives way."""
+    return [
+        f"joints {', '.join(map(repr, joints))} hold one another where modes of the bodies give way by {share:.1g} of "
+        "what others would: taken as rigid there, and as free of forces that balance one another; keep modes that bend that "
+        "way, or declare the plane of the motion"
+    ] * bool(joints)
 
 
 def body_doubts(scene: Scene) -> list[str]:
