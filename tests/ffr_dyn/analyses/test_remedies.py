@@ -127,11 +127,12 @@ SWAYING = replace(
 )
 
 
-def swung(damping: float) -> Scene:
-    """A bar on a spring, swung with its natural frequency."""
+def swung(damping: float, moment: float = 1.0, angle: float = 0.0) -> Scene:
+    """A bar on a spring, swung with its natural frequency, drawn at an angle."""
     spring = fd.JointSpring("s", "hinge", stiffness=(2 * np.pi * 1.3) ** 2 / 3, damping=damping)
-    moment = Load("l", "bar.b", moment=(0, 0, harmonic(amplitude=1.0, frequency=1.3)))
-    return replace(HINGED, forces=(spring,), loads=(moment,))
+    load = Load("l", "bar.b", moment=(0, 0, harmonic(amplitude=moment, frequency=1.3)))
+    bodies = (replace(HINGED.bodies[0], rotation=(0, 0, angle)),)
+    return replace(HINGED, bodies=bodies, forces=(spring,), loads=(load,))
 
 
 SPRUNG = replace(HINGED, forces=(fd.JointSpring("s", "hinge", stiffness=100.0, damping=5.0),))
@@ -916,6 +917,10 @@ INPUT = [
     Case(lambda: fd.steady(DRAGGED), lambda: fd.steady(TURNING)),
     Case(lambda: fd.steady(governor(1000.0)), lambda: fd.steady(governor(1.0))),
     Case(lambda: fd.periodic(swung(0.0), period=1 / 1.3), lambda: fd.periodic(swung(1.0), period=1 / 1.3)),
+    Case(
+        lambda: fd.periodic(swung(1.0, 20.0), period=1 / 1.3),
+        lambda: fd.periodic(swung(1.0, 20.0, -2.0), period=1 / 1.3),
+    ),
     Case(lambda: fd.periodic(struck(0.02), period=1 / 1.3), lambda: fd.periodic(struck(5.0), period=1 / 1.3)),
     Case(lambda: fd.periodic(struck(0.5), period=1 / 1.3), lambda: fd.periodic(struck(5.0), period=1 / 1.3)),
     Case(lambda: fd.steady(on_springs(stiff=False)), lambda: fd.steady(on_springs(stiff=True))),
