@@ -75,6 +75,7 @@ from ffr_dyn.integrators import (
 )
 from ffr_dyn.integrators.stabilisation import Baumgarte, Drifting, Projection
 from ffr_dyn.linear.continuation import Problem, branch
+from ffr_dyn.linear.turn_map import placed, turns
 from ffr_dyn.pictures.scene_view import open_window, scene_view
 from ffr_dyn.realtime.stepper import Stepper
 from ffr_dyn.results.file import load_result
@@ -149,6 +150,13 @@ SHAKEN = replace(
     drivers=(Driver("d", DOUBLE.joints[0].name, 0.0),),
     forces=(fd.JointSpring("s", DOUBLE.joints[1].name, stiffness=100.0, damping=5.0),),
 )
+
+
+def deviated(share: float) -> object:
+    """The state of a double pendulum at a share of the scene's size from where it hangs."""
+    at = assemble(DOUBLE)
+    of = turns(at.system, 0.0, at.x, at.v, ROS2(0.01), 1.0)
+    return placed(of, share * of.scale)
 
 
 def swayed(scene: Scene = SPRUNG, **how: object) -> object:
@@ -881,6 +889,7 @@ INPUT = [
         lambda: fd.response(SPRUNG, input="base.y.velocity", outputs=["bar.b.position.y"], frequencies=[0.0, 1.0]),
         lambda: fd.response(SPRUNG, input="base.y.velocity", outputs=["bar.b.position.y"], frequencies=[0.5, 1.0]),
     ),
+    Case(lambda: deviated(3.0), lambda: deviated(0.1)),
     *(
         Case(partial(swayed, **wrong), partial(swayed, **right))
         for wrong, right in (
