@@ -85,35 +85,42 @@ def _solution(of: Problem, u: Array, p: float, towards: Array, units: Array, J: 
 
 def _next(of: Problem, at: Solution, units: Array, h: float) -> tuple[Solution, float]:
     """The solution a step on, and the step after it."""
+    why: ComputationError | None = None
     while h >= LEAST:
-        found, count = _corrected(of, at, units, h)
+        try:
+            found, count = _corrected(of, at, units, h)
+        except ComputationError as error:
+            found, count, why = None, CORRECTIONS, error
         if found is not None:
             after = _solution(of, found[:-1], float(found[-1]), at.tangent, units)
             if (after.tangent / units) @ (at.tangent / units) >= BENT:
                 return after, min(2.0 * h if count <= SOON else h, of.longest)
         h /= 2
     raise ComputationError(
-        f"the periodic motion cannot be followed beyond {of.words(at.p)}: it may change at once there, at a stop or by dry "
-        "friction; give more steps to a period, a smaller amplitude, or a band that ends there"
-    )
+        f"the periodic motion cannot be followed beyond {of.words(at.p)}: "
+        + (
+            str(why)
+            if why
+            else "it may change at once there, at a stop or by dry friction; give more steps to a period"
+        )
+        + "; give a smaller amplitude, or a band that ends there"
+    ) from why
 
 
 def _corrected(of: Problem, at: Solution, units: Array, h: float) -> tuple[Array | None, int]:
-    """(n + 1,) the solution in the plane across the tangent at a step, and how many corrections it took."""
+    """(n + 1,) the solution in the plane across the tangent at a step, and how many corrections it took; None where they do
+    not converge. Raises ComputationError where G cannot be computed."""
     t, closed = at.tangent / units, max(ROUNDING, CLOSED * units[0])
     w = np.append(at.u, at.p) / units + h * t
     A = np.vstack([at.J * units, t])
-    try:
+    G = of.G(w[:-1] * units[:-1], float(w[-1] * units[-1]))
+    for count in range(1, CORRECTIONS + 1):
+        step = np.linalg.lstsq(A, -np.append(G, 0.0), rcond=1e-13)[0]
+        w = w + step
         G = of.G(w[:-1] * units[:-1], float(w[-1] * units[-1]))
-        for count in range(1, CORRECTIONS + 1):
-            step = np.linalg.lstsq(A, -np.append(G, 0.0), rcond=1e-13)[0]
-            w = w + step
-            G = of.G(w[:-1] * units[:-1], float(w[-1] * units[-1]))
-            if np.abs(G).max(initial=0.0) <= closed:
-                return w * units, count
-            A[:-1] += np.outer(G, step) / (step @ step)
-    except ComputationError:
-        pass
+        if np.abs(G).max(initial=0.0) <= closed:
+            return w * units, count
+        A[:-1] += np.outer(G, step) / (step @ step)
     return None, CORRECTIONS
 
 

@@ -21,7 +21,7 @@ from ffr_dyn.consistency.evaluation import Evaluator, evaluate, evaluator, rows_
 from ffr_dyn.consistency.failure import failure
 from ffr_dyn.consistency.tangent import STEP, Chart, chart, sizes_of
 from ffr_dyn.equations.layout import ROUNDING, Layout, moved, to_body_axes, to_global_axes
-from ffr_dyn.functions.rotation import rotation_matrix
+from ffr_dyn.functions.rotation import rotation_matrix, tangent
 from ffr_dyn.functions.time_functions import evaluate as value_of
 from ffr_dyn.functions.together import together
 from ffr_dyn.integrators import Integrator
@@ -40,7 +40,8 @@ CORRECTIONS, MET = 12, 1e-13  # of a deviation onto the constraints, and of rows
 OWN_PERIOD = (
     "a vibration that excites itself makes its own period: run `forward` until it has settled, and measure it there"
 )
-AGAIN = 0.5  # rad, or the scene's size: of deviations beyond which a state does not count as come back
+AGAIN = 0.5  # rad: of turns over a period beyond which a body does not count as come back
+QUARTER = 0.5 * np.pi  # rad: of turns from the chart's state; farther off, minimal coordinates may fit two states
 
 
 @dataclass(frozen=True)
@@ -108,13 +109,28 @@ def period_of(scene: Scene, time: float) -> float:
 
 
 def after(of: Turns, x: Array, v: Array, *, rows: int = 1, later: float = 0.0) -> Record:
-    """`rows` states of the period that begins at (x, v), evenly, the last at its end; or of one that begins `later` [s]."""
+    """`rows` states of the period that begins at (x, v), evenly, the last at its end; or of one that begins `later` [s].
+
+    Raises ComputationError where a body has turned: how far it may move depends on what holds it, not on the scene's size.
+    """
     start, engine = of.near.time + later, engine_of(of, x, v)
     record = new_record(of.system, rows)
     status = fill_rows(engine, record, start, of.steps // rows)
     if status != OK:
         raise failure(of.system, engine.work, status, start)
+    place = of.system.layout
+    if _turned_most(place, between(place, x, record.x[-1])) > AGAIN:
+        raise ComputationError(
+            f"after a period of {of.period:.6g} s the scene is not where it began: the period is not that of its drivers and "
+            "loads, or a body goes on turning (give another period), or bodies swing up to the speed of what drives them "
+            f"(give them its velocity); {OWN_PERIOD}"
+        )
     return record
+
+
+def _turned_most(place: Layout, y: Array) -> float:
+    """[rad] of the body that a movement y (V,) turns most."""
+    return max((float(np.linalg.norm(y[place.omega(b)])) for b in range(len(place.n))), default=0.0)
 
 
 def engine_of(of: Turns, x: Array, v: Array) -> Engine:
@@ -132,16 +148,28 @@ def placed(of: Turns, s: Array) -> tuple[Array, Array]:
     """
     near, place, d = of.near, of.system.layout, of.near.steps.size
     y, V = near.Z @ s[:d], near.V + near.Z @ s[d:]
+    met = False
     for _ in range(CORRECTIONS):
         x = moved(place, near.x, y)
         now = evaluate(near.at, near.time, x, to_global_axes(place, x, V))
-        if rows_close(near.at, x, now, MET):
+        if met:  # and corrected once more: what is left open kicks stiff bodies
             return x, to_global_axes(place, x, V + of.across @ _least(now.jacobian @ of.across, -now.nu))
-        y = y + of.across @ _least(now.jacobian @ of.across, -now.Phi)
+        met = rows_close(near.at, x, now, MET)
+        y = y + of.across @ _least(now.jacobian @ _seen_there(of, x, y, of.across), -now.Phi)
     raise ComputationError(
         f"at t = {near.time:.6g} s the search for a periodic motion came to a state that the joints do not allow; "
         "begin nearer"
     )
+
+
+def _seen_there(of: Turns, x: Array, y: Array, changes: Array) -> Array:
+    """(V, C) in body axes at the state x (X,), to which y (V,) moves the chart's, what changes (V, C) of y do there."""
+    place, out = of.system.layout, changes.copy()
+    for b in range(len(place.n)):
+        A0, A = rotation_matrix(of.near.x[place.p(b)]), rotation_matrix(x[place.p(b)])
+        out[place.R_dot(b)] = A.T @ A0 @ changes[place.R_dot(b)]
+        out[place.omega(b)] = tangent(y[place.omega(b)]).T @ changes[place.omega(b)]
+    return out
 
 
 def _least(matrix: Array, right: Array) -> Array:
@@ -152,11 +180,10 @@ def deviation(of: Turns, x: Array, v: Array) -> Array:
     """(2 d,) minimal coordinates of a state near the chart's. Raises ComputationError for one that is not near."""
     near, place = of.near, of.system.layout
     y, V = between(place, near.x, x), to_body_axes(place, x, v)
-    if np.abs(y / of.sizes).max() > AGAIN:
+    if (turned := _turned_most(place, y)) > QUARTER:
         raise ComputationError(
-            f"after a period of {of.period:.6g} s the scene is not where it began: the period is not that of its drivers and "
-            "loads, or a body goes on turning (give another period), or bodies swing up to the speed of what drives them "
-            f"(give them its velocity); {OWN_PERIOD}"
+            f"a body swings {turned:.3g} rad away from where the search for a motion of period {of.period:.6g} s began, "
+            "which finds motions up to a quarter of a turn away; begin nearer to the motion"
         )
     return np.concatenate([near.W.T @ y, near.W.T @ (V - near.V)])
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from scipy.integrate import solve_ivp
 from scipy.optimize import brentq, root
 from scipy.special import ellipk
 from test_analyses_cli import SCENE
@@ -121,6 +122,48 @@ def test_small_vibrations_are_those_of_the_linear_response(given):
     np.testing.assert_allclose(H, wanted["transfer"] @ [1, 1j], rtol=2e-4)
     sines = found["harmonics"][:, :, 0]  # wherever between the rows their peaks are
     np.testing.assert_allclose(found["amplitude"], sines, rtol=5e-5)
+
+
+@pytest.mark.slow
+def test_a_small_body_on_a_long_way_is_a_linear_oscillator():
+    """F / |k - m w^2 + i c w| of a kilogram as small as a pea that moves by 75 mm: what it may move is not its size."""
+    scene = duffing(2.0)
+    mass = fd.rigid_body("m", mass=M, inertia=(1e-5, 1e-5, 1e-5), points={"c": (0, 0, 0)})
+    spring = fd.JointSpring("spring", "rail", stiffness=400.0, damping=2.0, coordinate="stroke")
+    scene = replace(scene, bodies=(fd.Body("m", mass),), forces=(spring,))
+    found = fd.forced(scene, input="rail.force", amplitude=3.0, outputs=["rail.stroke"], band_of=(2.5, 4))
+    w = 2 * np.pi * found["frequency"]
+    np.testing.assert_allclose(found["amplitude"][:, 0], 3 / np.abs(400 - w**2 + 2j * w), rtol=2e-3)
+    assert found["amplitude"].max() > 0.074
+
+
+@pytest.mark.slow
+def test_a_pendulum_swings_by_more_than_a_radian():
+    """(I + m l^2) x'' + c x' + m g l sin x = T sin(w t): each motion, stable or not, repeats itself by SciPy's solver."""
+    bob = fd.rigid_body("bob", mass=1.0, inertia=(1e-3, 1e-3, 1e-3), points={"hub": (0, 0.3, 0)})
+    scene = fd.Scene(
+        (fd.Body("bob", bob, position=(0, -0.3, 0)),),
+        (fd.Joint("pin", "revolute", "ground.O", "bob.hub"),),
+        forces=(fd.JointSpring("drag", "pin", damping=0.03),),
+        ground={"O": (0, 0, 0)},
+        gravity=(0, -9.81, 0),
+    )
+    found = fd.forced(scene, input="pin.moment", amplitude=0.2, outputs=["pin.angle"], band_of=(0.7, 1.0))
+    assert found["amplitude"].max() > 1.2
+    assert len(found.attributes["jumps"]) == 2
+    for k in range(0, found["frequency"].size, 12):
+        w = 2 * np.pi * found["frequency"][k]
+
+        def rates(t, y, w=w):
+            return [y[1], (0.2 * np.sin(w * t) - 0.03 * y[1] - 0.3 * 9.81 * np.sin(y[0])) / 0.091]
+
+        def period(y, w=w, rates=rates):
+            return solve_ivp(rates, (0, 2 * np.pi / w), y, method="DOP853", rtol=1e-10, atol=1e-11, max_step=0.02).y
+
+        first = found["harmonics"][k, 0, 0] * np.exp(1j * np.radians(found["phase"][k, 0]))
+        start = root(lambda y, period=period: period(y)[:, -1] - y, [first.imag, w * first.real], tol=1e-10)
+        assert np.abs(start.fun).max() < 1e-5  # where the branch turns back SciPy finds it no nearer
+        assert found["amplitude"][k, 0] == pytest.approx(np.ptp(period(start.x)[0]) / 2, rel=1e-3)
 
 
 @pytest.mark.slow

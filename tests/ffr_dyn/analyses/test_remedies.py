@@ -75,6 +75,7 @@ from ffr_dyn.integrators import (
 )
 from ffr_dyn.integrators.stabilisation import Baumgarte, Drifting, Projection
 from ffr_dyn.linear.continuation import Problem, branch
+from ffr_dyn.linear.turn_map import placed, turns
 from ffr_dyn.pictures.scene_view import open_window, scene_view
 from ffr_dyn.realtime.stepper import Stepper
 from ffr_dyn.results.file import load_result
@@ -127,11 +128,12 @@ SWAYING = replace(
 )
 
 
-def swung(damping: float) -> Scene:
-    """A bar on a spring, swung with its natural frequency."""
+def swung(damping: float, moment: float = 1.0, angle: float = 0.0) -> Scene:
+    """A bar on a spring, swung with its natural frequency, drawn at an angle."""
     spring = fd.JointSpring("s", "hinge", stiffness=(2 * np.pi * 1.3) ** 2 / 3, damping=damping)
-    moment = Load("l", "bar.b", moment=(0, 0, harmonic(amplitude=1.0, frequency=1.3)))
-    return replace(HINGED, forces=(spring,), loads=(moment,))
+    load = Load("l", "bar.b", moment=(0, 0, harmonic(amplitude=moment, frequency=1.3)))
+    bodies = (replace(HINGED.bodies[0], rotation=(0, 0, angle)),)
+    return replace(HINGED, bodies=bodies, forces=(spring,), loads=(load,))
 
 
 SPRUNG = replace(HINGED, forces=(fd.JointSpring("s", "hinge", stiffness=100.0, damping=5.0),))
@@ -148,6 +150,13 @@ SHAKEN = replace(
     drivers=(Driver("d", DOUBLE.joints[0].name, 0.0),),
     forces=(fd.JointSpring("s", DOUBLE.joints[1].name, stiffness=100.0, damping=5.0),),
 )
+
+
+def deviated(share: float) -> object:
+    """The state of a double pendulum at a share of the scene's size from where it hangs."""
+    at = assemble(DOUBLE)
+    of = turns(at.system, 0.0, at.x, at.v, ROS2(0.01), 1.0)
+    return placed(of, share * of.scale)
 
 
 def swayed(scene: Scene = SPRUNG, **how: object) -> object:
@@ -889,6 +898,7 @@ INPUT = [
         lambda: fd.response(SPRUNG, input="base.y.velocity", outputs=["bar.b.position.y"], frequencies=[0.0, 1.0]),
         lambda: fd.response(SPRUNG, input="base.y.velocity", outputs=["bar.b.position.y"], frequencies=[0.5, 1.0]),
     ),
+    Case(lambda: deviated(3.0), lambda: deviated(0.1)),
     *(
         Case(partial(swayed, **wrong), partial(swayed, **right))
         for wrong, right in (
@@ -925,6 +935,10 @@ INPUT = [
     Case(lambda: fd.steady(DRAGGED), lambda: fd.steady(TURNING)),
     Case(lambda: fd.steady(governor(1000.0)), lambda: fd.steady(governor(1.0))),
     Case(lambda: fd.periodic(swung(0.0), period=1 / 1.3), lambda: fd.periodic(swung(1.0), period=1 / 1.3)),
+    Case(
+        lambda: fd.periodic(swung(1.0, 20.0), period=1 / 1.3),
+        lambda: fd.periodic(swung(1.0, 20.0, -2.0), period=1 / 1.3),
+    ),
     Case(lambda: fd.periodic(struck(0.02), period=1 / 1.3), lambda: fd.periodic(struck(5.0), period=1 / 1.3)),
     Case(lambda: fd.periodic(struck(0.5), period=1 / 1.3), lambda: fd.periodic(struck(5.0), period=1 / 1.3)),
     Case(lambda: fd.steady(on_springs(stiff=False)), lambda: fd.steady(on_springs(stiff=True))),

@@ -13,8 +13,11 @@ from test_dyn_plane import slider_crank as flexible_crank
 import ffr_dyn as fd
 import ffr_prep as fp
 from ffr_dyn.analyses.rotating.periodic import floquet_lines
+from ffr_dyn.consistency.assemble import assemble
+from ffr_dyn.functions.rotation import rotation_matrix
 from ffr_dyn.functions.time_functions import evaluate
 from ffr_dyn.functions.together import alone
+from ffr_dyn.linear.turn_map import between, deviation, placed, turns
 from ffr_prep.common.errors import InputError
 from ffr_prep.model.material import Material
 from ffr_prep.structures.frame import Member, named, polyline
@@ -23,8 +26,8 @@ from ffr_prep.structures.sections import rectangle
 FORCED = 3.0  # rad/s
 
 
-def oscillator(damping: float = 0.4) -> fd.Scene:
-    mass = fd.rigid_body("m", mass=2.0, inertia=(1, 1, 1), points={"c": (0, 0, 0)})
+def oscillator(damping: float = 0.4, inertia: float = 1.0) -> fd.Scene:
+    mass = fd.rigid_body("m", mass=2.0, inertia=(inertia,) * 3, points={"c": (0, 0, 0)})
     push = fd.Load("push", "m.c", force=(fd.harmonic(amplitude=1.5, frequency=FORCED / (2 * np.pi)), 0, 0))
     return fd.Scene(
         (fd.Body("m", mass),),
@@ -35,11 +38,11 @@ def oscillator(damping: float = 0.4) -> fd.Scene:
     )
 
 
-@pytest.mark.parametrize("damping", [0.4, 0.0])
-def test_the_forced_oscillation_of_a_linear_oscillator(damping):
-    """Also without damping, where no run settles."""
+@pytest.mark.parametrize(("damping", "inertia"), [(0.4, 1.0), (0.0, 1.0), (0.4, 1e-9)])
+def test_the_forced_oscillation_of_a_linear_oscillator(damping, inertia):
+    """Also without damping, where no run settles, and of a body far smaller than its way."""
     period = 2 * np.pi / FORCED
-    found = fd.periodic(oscillator(damping), period=period, method=fd.RK4(period / 1000))
+    found = fd.periodic(oscillator(damping, inertia), period=period, method=fd.RK4(period / 1000))
     x = found["m.R.x"]
     H = 1.5 / (50.0 - 2 * FORCED**2 + 1j * damping * FORCED)
     wave = H * np.exp(1j * FORCED * found.time)
@@ -156,6 +159,23 @@ def test_the_error_of_multipliers_is_told():
         true = abs(complex(*truth["multipliers"][0]) - complex(*run["multipliers"][0]))
         assert 0.25 * true < run["multiplier_errors"][0] < 5 * true
     assert f", within {runs[-1]['multiplier_errors'][0]:.2g}   rod: " in floquet_lines(runs[-1])[0]
+
+
+@pytest.mark.parametrize("size", [0.1, 0.7, 1.2])
+def test_deviations_of_a_body_that_turns_far_are_found_again(size):
+    """About a skew axis of space, off its centre of mass: the state meets the joint, and has the deviation that it is of."""
+    body = fd.rigid_body("b", mass=1.0, inertia=(0.1, 0.2, 0.3), points={"hub": (0.1, 0.4, -0.2)})
+    joint = fd.Joint("ball", "spherical", "ground.O", "b.hub")
+    bodies = (fd.Body("b", body, position=(-0.1, -0.4, 0.2)),)
+    assembled = assemble(fd.Scene(bodies, (joint,), ground={"O": (0, 0, 0)}))
+    of = turns(assembled.system, 0.0, assembled.x, assembled.v, fd.ROS3(0.01), 1.0)
+    wanted = size * of.scale * np.array([0.5, -0.3, 0.4, 0.2, 1.0, -0.5])
+    x, v = placed(of, wanted)
+    place = assembled.system.layout
+    hub = x[place.R(0)] + rotation_matrix(x[place.p(0)]) @ [0.1, 0.4, -0.2]
+    np.testing.assert_allclose(hub, 0, atol=1e-13)
+    assert np.linalg.norm(between(place, of.near.x, x)[place.omega(0)]) > 0.5 * size
+    np.testing.assert_allclose(deviation(of, x, v), wanted, atol=1e-13)
 
 
 @pytest.mark.parametrize("steps", [37, 460, 1037])

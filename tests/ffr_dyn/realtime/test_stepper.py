@@ -297,6 +297,23 @@ def test_every_quantity_but_work_can_be_an_output():
         np.testing.assert_allclose(values, run[name][-1], rtol=1e-13, atol=1e-13, err_msg=name)
 
 
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize(("kind", "coordinate"), [("translational", "stroke"), ("revolute", "angle")])
+def test_the_power_of_a_driver_is_force_times_rate_and_begins_without_warning(kind, coordinate):
+    """Of a kilogram, or a kg m^2, under an acceleration of 2 from a rate of 1: 2 (1 + 2 t)."""
+    body = rigid_body("m", mass=1.0, inertia=(1, 1, 1), points={"c": (0, 0, 0)})
+    scene = Scene(
+        (Body("m", body),),
+        (Joint("j", kind, "ground.O", "m.c", axis=(0, 0, 1)),),
+        (Driver("d", "j", polynomial(0.0, 1.0, 1.0), coordinate=coordinate),),
+        ground={"O": (0, 0, 0)},
+    )
+    stepper = Stepper(scene, METHOD, outputs=("d.power",))
+    assert stepper.outputs()["d.power"] == pytest.approx(2.0, rel=1e-9)
+    stepper.step(100)
+    assert stepper.outputs()["d.power"] == pytest.approx(2 * (1 + 2 * stepper.time), rel=1e-9)
+
+
 def test_components_and_memory_that_is_shared():
     stepper = Stepper(arm(), METHOD, outputs=("bob.c.position", "bob.c.position.y", "arm.q", "arm.q.2", "hinge.angle"))
     outputs = stepper.outputs()
