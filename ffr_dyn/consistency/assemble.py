@@ -39,6 +39,7 @@ from ffr_dyn.variants.aligned import levelled
 from ffr_dyn.variants.mean_axis import in_mean_axis_frames
 from ffr_dyn.variants.plane import AXES, obstacles, planar_forms
 from ffr_prep.body import (
+    CUT_PAIR,
     cut_doubt,
     cut_stress_doubt,
     damping_ratio,
@@ -151,6 +152,7 @@ def body_doubts(scene: Scene) -> list[str]:
     doubts += [(b.name, of(b.model.provenance)) for b in stressed for of in (steady_stress_doubt, shear_doubt)]
     doubts += [(owner(b), cut_stress_doubt(b.part_of.model)) for b in stressed if b.part_of]
     doubts += [(body.name, doubt) for body in scene.bodies for doubt in units_doubts(body.model)]
+    doubts += [(body.name, body.model.provenance.get(CUT_PAIR)) for body in scene.bodies if scene.plane == "none"]
     return [f"body {name!r}: {doubt}" for name, doubt in dict.fromkeys(doubts) if doubt] + _gravity_doubts(scene)
 
 
