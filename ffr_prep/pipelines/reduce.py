@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from importlib.metadata import version
-from numbers import Integral
 from typing import Any
 
 import numpy as np
@@ -182,7 +181,7 @@ def _check_asked(model: Model, request: Request) -> None:
     """InputError where the modes that are asked for by number have too large a second order: before the search for them,
     which may take hours."""
     asked, size = getattr(request.reduction, "modes", None), model.coupled.K.shape[0]
-    if isinstance(asked, Integral) and 0 < asked <= size and not (request.linear or model.unstressed):
+    if isinstance(asked, int | np.integer) and 0 < asked <= size and not (request.linear or model.unstressed):
         check_size(int(asked), len(model.coupled.names), model.surface(np.zeros((size, 0))), request.drawn_modes)
 
 
