@@ -6,8 +6,9 @@ from pathlib import Path
 
 import click
 
-from ffr_prep.common.command import INPUT_FILE, OUTPUT_FILE, check_folder
+from ffr_prep.common.command import INPUT_FILE, OUTPUT_FILE
 from ffr_prep.common.errors import InputError
+from ffr_prep.common.outputs import check_folder
 
 _NOTES = """\b
 Quantities:

@@ -40,6 +40,7 @@ from ffr_dyn.variants.in_line import in_line
 from ffr_dyn.variants.mean_axis import in_mean_axis_frames
 from ffr_dyn.variants.plane import level_in_space, obstacles, planar_forms
 from ffr_prep.body import (
+    CUT_PAIR,
     cut_doubt,
     cut_stress_doubt,
     damping_ratio,
@@ -164,6 +165,7 @@ def body_doubts(scene: Scene) -> list[str]:
     doubts += [(b.name, of(b.model.provenance)) for b in stressed for of in (steady_stress_doubt, shear_doubt)]
     doubts += [(owner(b), cut_stress_doubt(b.part_of.model)) for b in stressed if b.part_of]
     doubts += [(body.name, doubt) for body in scene.bodies for doubt in units_doubts(body.model)]
+    doubts += [(body.name, body.model.provenance.get(CUT_PAIR)) for body in scene.bodies if scene.plane == "none"]
     return [f"body {name!r}: {doubt}" for name, doubt in dict.fromkeys(doubts) if doubt] + _gravity_doubts(scene)
 
 

@@ -222,12 +222,15 @@ def _markers(system: System) -> Named:
     for k, (name, (b, _, _)) in enumerate(zip(marker_names(system.scene), markers(system.scene), strict=True)):
         if b == ground:
             continue
-        for what, entry in _marker(k).items():
+        part = system.scene.bodies[b].part_of and system.scene.bodies[b].name
+        for what, entry in _marker(k, f"seen from the part {part!r}" if part else "body axes").items():
             if what != "displacement" or system.layout.n[b]:
                 yield f"{name}.{what}", entry
 
 
-def _marker(k: int) -> dict[str, Entry]:
+def _marker(k: int, frame: str) -> dict[str, Entry]:
+    """frame : in words, where displacements are seen from"""
+
     def vector(unit: str, text: str, values: Callable[[View], Array]) -> Entry:
         return _entry(unit, (XYZ,), text, values)
 
@@ -235,7 +238,7 @@ def _marker(k: int) -> dict[str, Entry]:
     return {
         "position": vector("m", "position of the marker, global axes", lambda view: view.record.r[:, k]),
         "velocity": vector("m/s", "velocity of the marker, global axes", lambda view: view.record.rd[:, k]),
-        "displacement": vector("m", "elastic displacement of the marker, body axes", lambda v: v.displacement(k)),
+        "displacement": vector("m", f"elastic displacement of the marker, {frame}", lambda v: v.displacement(k)),
         "acceleration": vector("m/s^2", "acceleration of the marker, global axes", lambda v: v.acceleration(k)),
         "orientation": _entry("1", (EULER_PARAMETERS,), parameters, lambda view: view.orientation(k)),
         "angular_velocity": vector("rad/s", "angular velocity of the marker, global axes", lambda view: view.spin(k)),

@@ -12,6 +12,7 @@ from ffr_dyn.studies.measures import TIME
 from ffr_dyn.studies.table import Table
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
+from ffr_prep.common.outputs import made_folder
 from ffr_prep.common.units import bracketed, pretty
 
 LEVELS = 20
@@ -46,9 +47,7 @@ def plot_study(table: Table, folder: str | Path, outputs: Sequence[str] = ()) ->
     several = {name: values for name, values in table.parameters.items() if len(set(values)) > 1}
     if not several:
         raise InputError("no parameter of the study has several values: there is nothing to draw over")
-    folder = Path(folder)
-    folder.mkdir(parents=True, exist_ok=True)
-    return list(_drawn(table, names, several, folder))
+    return list(_drawn(table, names, several, made_folder("the folder of pictures", folder)))
 
 
 def _drawn(table: Table, names: list[str], several: dict[str, Any], folder: Path) -> Iterator[Path]:

@@ -206,10 +206,14 @@ def _check_settings(
     for name, number in (("samples", samples), ("seed", seed)):
         if type(number) is not int or number < 0:
             raise InputError(f"{name} is {number!r}; give a whole number, 0 or more")
-    if samples and not any(isinstance(values, Spread) for values in found.values()):
-        raise InputError(
-            f"samples = {samples} changes nothing: no parameter has a distribution such as {{uniform = [1, 3]}}; leave it out"
-        )
+    if any(isinstance(values, Spread) for values in found.values()):
+        return
+    for name, value, default in (("samples", samples, 0), ("sampling", sampling, "monte-carlo"), ("seed", seed, 0)):
+        if value != default:
+            raise InputError(
+                f"{name} = {value} changes nothing: no parameter has a distribution such as {{uniform = [1, 3]}}; leave it "
+                "out"
+            )
 
 
 def _hint(where: str) -> str:

@@ -21,7 +21,7 @@ from ffr_dyn.analyses.run import run
 from ffr_dyn.analyses.settings import MomentSettings, Settings
 from ffr_dyn.scene_file.read import load_scene
 from ffr_dyn.studies.measures import ERROR, Measured, Number, units, values, wanted
-from ffr_prep.body import BodyError, FlexibleBody, load_body
+from ffr_prep.body import MAKE_AGAIN, BodyError, FlexibleBody, load_body
 from ffr_prep.common.errors import ComputationError, InputError
 from ffr_prep.common.outputs import InUseError, no_room
 
@@ -107,8 +107,14 @@ def _in_a_line(text: str) -> str:
 
 @lru_cache(maxsize=LOADED)
 def _body(path: str) -> FlexibleBody:
-    """The body of a file that is named by what is in it; what was prepared of it for other runs is kept with it."""
-    return load_body(path)
+    """The body of a file that is named by what is in it; what was prepared of it for other runs is kept with it.
+
+    Raises BodyError with the remedy of a file that the study makes itself.
+    """
+    try:
+        return load_body(path)
+    except BodyError as error:
+        raise BodyError(str(error).replace(MAKE_AGAIN, "delete it, and the study makes it anew")) from None
 
 
 def _kept(settings: Settings | MomentSettings, outputs: tuple[Measured, ...], whole: bool) -> Settings | MomentSettings:

@@ -15,7 +15,7 @@ from ffr_dyn.studies.runs import Full, Point, Recipe, Row, Task, make, perform
 from ffr_dyn.studies.table import Journal, Table, journal_of, save_table, table
 from ffr_dyn.studies.workers import crew
 from ffr_prep.common.errors import ComputationError, InputError
-from ffr_prep.common.outputs import reserved
+from ffr_prep.common.outputs import made_folder, reserved
 
 MOST_IN_A_TASK = 64  # runs
 TASKS = 16  # of every worker, at least, that their ends are near each other
@@ -44,7 +44,7 @@ def sweep(
     to the bit as one that was never stopped, with any number of workers. Runs that fail are rows with a message.
 
     Raises InputError for a study that cannot be run, a cluster that does not answer, the journal of another study;
-    ComputationError where no run succeeds.
+    ComputationError where no run succeeds; the table has their messages.
 
         table = fd.sweep("study.toml", "study.nc"); table["force"]
 
@@ -65,11 +65,12 @@ def sweep(
                 end.add_note(f"{kept}, and the same command goes on with them")
                 raise
         found = table(made, journal.rows)
-        if not any(row.values for row in journal.rows.values()):
-            journal_of(path).unlink()
-            raise ComputationError(f"no run has succeeded; the first says: {found.messages[0]}")
         save_table(found, path)
         journal_of(path).unlink()
+        if not any(row.values for row in journal.rows.values()):
+            raise ComputationError(
+                f"no run has succeeded; the first says: {found.messages[0]} ({path} has all messages)"
+            )
     return found
 
 
@@ -93,7 +94,7 @@ def _bodies(
     lines = {(name, recipe(study, name, study.points[k])): "" for k in left for name in study.recipes}
     if not lines:
         return {}
-    folder.mkdir(parents=True, exist_ok=True)
+    made_folder("the folder of bodies", folder)
     known: Contents = {}
     files = {key: str(body_file(key[1], study.folder, folder, known).resolve()) for key in lines}
     wanted = {file: Recipe(line, str(study.folder.resolve()), file) for (_, line), file in files.items()}
@@ -124,8 +125,7 @@ def _points(study: Study, left: Sequence[int], bodies: Mapping[tuple[str, str], 
 def _run(study: Study, path: Path, points: list[Point], where: Pool, journal: Journal, progress: Progress) -> None:
     histories = ""
     if study.histories:
-        Path(f"{path}.runs").mkdir(parents=True, exist_ok=True)
-        histories = str(Path(f"{path}.runs").resolve())
+        histories = str(made_folder("the folder of histories", f"{path}.runs").resolve())
     whole = Task(str(study.scene.resolve()), study.outputs, (), histories)
     lost = _performed(whole, _shares(points), where, journal, progress)
     _performed(whole, [[point] for task in lost for point in task.points], where, journal, progress)

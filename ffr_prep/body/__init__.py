@@ -15,8 +15,8 @@ from ffr_prep.body.chain import damping_ratio, free_vibrations
 from ffr_prep.body.constructors import check_point, recombined, rigid_body, with_point
 from ffr_prep.body.cut_error import CUT_ERROR, cut_doubt, cut_error, cut_errors_of, cut_stress_doubt
 from ffr_prep.body.damping import Damping, damped, with_damping
-from ffr_prep.body.fewer_modes import truncated
-from ffr_prep.body.file import content_hash, load_body, save_arrays, save_body, surface_arrays, surface_of
+from ffr_prep.body.fewer_modes import CUT_PAIR, cut_pair, paired, truncated
+from ffr_prep.body.file import MAKE_AGAIN, content_hash, load_body, save_arrays, save_body, surface_arrays, surface_of
 from ffr_prep.body.frame_change import interface_motions, mass_of_motions
 from ffr_prep.body.mean_axis import FrameMarker, MeanAxisForm, idle_loads, mean_axis_form, mean_axis_surface
 from ffr_prep.body.mesh_error import MESH_ERROR, mesh_doubt, mesh_errors_of
@@ -60,6 +60,8 @@ from ffr_prep.body.units_doubt import units_doubts
 
 __all__ = [
     "CUT_ERROR",
+    "CUT_PAIR",
+    "MAKE_AGAIN",
     "MESH_ERROR",
     "PRODUCTS",
     "SECTION_FORCES",
@@ -85,6 +87,7 @@ __all__ = [
     "cut_error",
     "cut_errors_of",
     "cut_names",
+    "cut_pair",
     "cut_stress_doubt",
     "damped",
     "damping_ratio",
@@ -106,6 +109,7 @@ __all__ = [
     "of_fewer_shapes",
     "of_plane",
     "pair_values",
+    "paired",
     "reach_of",
     "recombined",
     "recoordinated",

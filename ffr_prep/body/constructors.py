@@ -15,7 +15,9 @@ from ffr_prep.common.arrays import Array, ArrayLike
 from ffr_prep.common.errors import require_kind
 
 MOVED_POINTS = "moved_points"  # of the provenance: where points were asked for that have no surface near
-_OFF = 0.05  # of the size of a body: how far from its place a point is put without a word
+_OFF = 0.05  # of the size of a body: how far along its surface from its place a point is put without a word
+_OFF_SURFACE = 1e-3  # of the same: how far from its surface a point may be asked for
+_SAG = 0.25  # of an edge beside a node, by which the triangles of a coarse mesh miss a curved surface
 _MOST = 1e60  # of masses, moments and lengths in SI units, so that their products are numbers still
 
 
@@ -144,7 +146,8 @@ def with_point(body: FlexibleBody, name: str, position: ArrayLike) -> FlexibleBo
     surface. Nothing is added to the basis: what the node does under load is what the basis can show. A body with load
     matrices gets those of the point from the second-order displacement of its surface.
 
-    A node that is farther away than its neighbours, and than a twentieth of the size of the body, is told (`units_doubts`).
+    A node that is farther away than its neighbours, and than a twentieth of the size of the body, is told (`units_doubts`),
+    and so is a place that is off the surface, as on the axis of a beam or a bore: interfaces of the reduction can be there.
 
     Raises BodyError when the body has no surface, when it has load matrices and its surface no second-order displacement,
     or the position is farther from it than half the size of the body.
@@ -169,8 +172,30 @@ def with_point(body: FlexibleBody, name: str, position: ArrayLike) -> FlexibleBo
     parts = _parts_with_point(body, name, points[node])
     made = replace(body, interfaces=interfaces, stiffening=stiffening, parts=parts)
     asked = np.asarray(position, float)
-    away, near = np.linalg.norm(asked - points[node]), np.linalg.norm(arms, axis=1).max(initial=0.0)
-    return _moved(made, name, asked.tolist()) if away > max(near, _OFF * body.size) else made
+    away, near = np.linalg.norm(asked - points[node]), np.linalg.norm(arms, axis=1)
+    far, edge = max(near.max(initial=0.0), _OFF * body.size), near.min(initial=np.inf)
+    if body.provenance.get("members"):  # the lids of beams lie within them, and sides between stations may be long
+        told = away > max(edge / 2, _OFF_SURFACE * body.size)
+    else:
+        told = away > far or _from_surface(body.surface, asked) > max(_SAG * edge, _OFF_SURFACE * body.size)
+    return _moved(made, name, asked.tolist()) if told else made
+
+
+def _from_surface(surface: Surface, position: Array) -> float:
+    """Distance [m] of a place (3,) from the triangles of a surface."""
+    corners = surface.points[surface.triangles] - position
+    if not len(corners):
+        return np.inf
+    edges = np.roll(corners, -1, axis=1) - corners
+    lengths = np.einsum("tki,tki->tk", edges, edges)
+    share = np.clip(-np.einsum("tki,tki->tk", corners, edges) / np.where(lengths > 0, lengths, 1.0), 0.0, 1.0)
+    from_edges = np.linalg.norm(corners + share[..., None] * edges, axis=2).min(axis=1)
+    normal = np.cross(edges[:, 0], edges[:, 1])
+    above = np.einsum("tki,ti->tk", np.cross(corners, np.roll(corners, -1, axis=1)), normal)
+    size = np.linalg.norm(normal, axis=1)
+    inside = (above > 0).all(axis=1) & (size > 0)
+    from_planes = np.abs(np.einsum("ti,ti->t", corners[:, 0], normal)) / np.where(size > 0, size, 1.0)
+    return float(np.where(inside, from_planes, from_edges).min())
 
 
 def _moved(body: FlexibleBody, name: str, asked: list[float]) -> FlexibleBody:

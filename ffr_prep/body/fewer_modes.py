@@ -14,9 +14,14 @@ from ffr_prep.body.reduced import BodyError, FlexibleBody
 from ffr_prep.body.steady_stress import of_fewer_shapes
 from ffr_prep.common.arrays import Array
 
+CUT_PAIR = "cut_pair"  # of the provenance: what is to say of a number of modes that cuts one
+_SAME = 1e-3  # relative difference of frequencies that a symmetric body has twice: that of its mesh
+
 
 def truncated(body: FlexibleBody, modes: int | Array) -> FlexibleBody:
     """The body with only its first ``modes`` elastic coordinates, or those of the indices (k,) in `modes`; so are its parts.
+
+    A number that cuts a pair of equal frequency is told by the runs of a scene that moves in space.
 
     Raises BodyError for a mode that does not exist or is listed twice.
 
@@ -41,7 +46,7 @@ def truncated(body: FlexibleBody, modes: int | Array) -> FlexibleBody:
         surface=body.surface and recombined(body.surface, np.eye(body.n)[:, keep], body.surface.Phi[:, :, keep]),
         stiffening=None if body.stiffening is None else body.stiffening[:, keep][:, :, keep],
         damping=None if body.damping is None else body.damping[np.ix_(keep, keep)],
-        provenance=_of_modes(of_fewer_shapes(body, np.eye(body.n)[:, keep]), keep),
+        provenance=_with_cut_pair(_of_modes(of_fewer_shapes(body, np.eye(body.n)[:, keep]), keep), body, modes),
         parts=tuple(truncated(part, modes if np.ndim(modes) else min(int(modes), part.n)) for part in body.parts),
     )
 
@@ -53,3 +58,27 @@ def _of_modes(provenance: Mapping[str, Any], keep: Array) -> Mapping[str, Any]:
     if not known:
         return provenance
     return {**provenance, MESH_ERROR: {"modes": list(found), "too_high": list(found.values())}}
+
+
+def _with_cut_pair(provenance: Mapping[str, Any], body: FlexibleBody, modes: int | Array) -> Mapping[str, Any]:
+    """With what is to say of a number of modes; single ones are chosen by who knows them."""
+    told = cut_pair(body.omega2, int(modes), "modes that are kept") if np.ndim(modes) == 0 else ()
+    others = {key: value for key, value in provenance.items() if key != CUT_PAIR}
+    return {**others, CUT_PAIR: told[0]} if told else others
+
+
+def cut_pair(omega2: Array, count: int, what: str) -> tuple[str, ...]:
+    """Says so when the first mode that is left out, of those of ascending omega2, has the frequency of the last one kept."""
+    if not 0 < count < omega2.size or not paired(omega2)[count - 1]:
+        return ()
+    alone = np.flatnonzero(~paired(omega2)[: count - 1])
+    fewer = f", or for {alone[-1] + 1}" if alone.size else ""
+    return (
+        f"the number of {what}, {count}, cuts a pair of equal frequency ({np.sqrt(omega2[count]) / (2 * np.pi):.4g} Hz), as "
+        f"round and square bars have them: one plane is left stiffer than the other; ask for {count + 1}{fewer}",
+    )
+
+
+def paired(omega2: Array) -> Array:
+    """(p - 1,) whether a mode and the next one have the same frequency, but for what a mesh makes of it."""
+    return np.abs(np.diff(omega2)) <= 2 * _SAME * omega2[1:]

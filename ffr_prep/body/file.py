@@ -30,6 +30,7 @@ MAGIC = "ffr-body"
 # 2 adds stress modes and section forces, 3 the parts of a body that is cut, 4 a damping matrix. Files of before are read as
 # bodies without them, and a body without parts and damping is written as before.
 WHOLE, IN_PARTS, DAMPED = 2, 3, 4
+MAKE_AGAIN = "make it again with ffr-prep reduce"  # the remedy of a file that is damaged
 _LEVEL = 3  # of compression: a third of the time of zlib's own level, for files a twentieth larger
 
 
@@ -157,7 +158,7 @@ def load_body(path: str | Path) -> FlexibleBody:
         raise BodyError(f"{path}: {error}") from None
     except Exception as error:  # a damaged zip, array header or field can fail in any way the readers know
         what = "no zip file" if not is_zipfile(path) else str(error) or type(error).__name__
-        fault = f"is damaged, truncated or not a body file ({what}); make it again with ffr-prep reduce"
+        fault = f"is damaged, truncated or not a body file ({what}); {MAKE_AGAIN}"
         raise BodyError(not_of_its_ending(path, "a body file", fault)) from None
 
 

@@ -73,7 +73,7 @@ def _of_places(body: FlexibleBody) -> Iterator[str]:
         away = float(np.linalg.norm(np.array(asked) - at))
         yield (
             f"its point {name!r} was asked for at {_place(asked)} m and is where the surface is nearest, at {_place(at)} m, "
-            f"{away:.3g} m away: is that meant?"
+            f"{away:.3g} m away: is that meant? Within a body, as on the axis of a beam, interfaces of its reduction can be"
         )
 
 

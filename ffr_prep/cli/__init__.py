@@ -31,8 +31,9 @@ from ffr_prep.cli.request import REQUEST, WORDS, reduce_to_file, request_of
 from ffr_prep.cli.settings import EntriesCommand, NotesCommand
 from ffr_prep.cli.structure import reduce_structure_command
 from ffr_prep.cli.terminal import filed, show, terminal_steps
-from ffr_prep.common.command import INPUT_FILE, OUTPUT_FILE, check_folder, reserve, run_command
+from ffr_prep.common.command import INPUT_FILE, OUTPUT_FILE, reserve, run_command
 from ffr_prep.common.errors import InputError
+from ffr_prep.common.outputs import check_folder
 from ffr_prep.common.registry import load_plugin
 from ffr_prep.mesh.formats import MESH_FORMATS
 from ffr_prep.reduction.registry import REDUCTIONS

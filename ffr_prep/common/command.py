@@ -74,13 +74,6 @@ def check_ending(option: str, path: Path, usual: str) -> None:
         raise InputError(f"{option} {path}: by its ending this is {kind}; what is written here ends in {usual}")
 
 
-def check_folder(option: str, path: Path) -> None:
-    """InputError where a folder for several files is asked for and a file stands there, or above it."""
-    there = next((at for at in (path, *path.parents) if at.exists()), path)
-    if there.exists() and not there.is_dir():
-        raise InputError(f"{option} {path}: {there} is a file; name a folder")
-
-
 def run_command(group: click.Group, program: str, arguments: Sequence[str] | None = None) -> None:
     """Run a command line. Exit code 2 for bad input, 1 for a failed computation or a signal; one line, no traceback."""
     try:

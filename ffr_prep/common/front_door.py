@@ -1,7 +1,8 @@
 """The front door of a package: its public names, each loaded when it is first used (PEP 562).
 
 What is called through it, and fails for an argument of another type than its annotation, says so by an InputError. The
-types are looked at after the failure only: what works is none of the door's business, and costs nothing.
+types are looked at after the failure only: what works is none of the door's business, and costs nothing. Flags are looked
+at before: any value is true or false, so that a wrong one, as check="no", never fails.
 """
 
 from __future__ import annotations
@@ -20,6 +21,8 @@ from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_
 from ffr_prep.common.errors import ComputationError, InputError
 
 _SHOWN = 60  # letters of a value in a message
+_FLAGS = (bool, "bool", "bool | None")  # annotations
+_TRUTHS = ("bool", "bool_", "NoneType")  # types, NumPy's as well, which is not loaded here
 
 
 def front_door(
@@ -64,8 +67,16 @@ def _guarded(thing: Any, package: str) -> Any:
 
 
 def _explaining(function: Callable[..., Any], name: str) -> Callable[..., Any]:
+    flags = [(k, one.name) for k, one in enumerate(signature(function).parameters.values()) if one.annotation in _FLAGS]
+
     @wraps(function)
     def call(*args: Any, **named: Any) -> Any:
+        for k, flag in flags:
+            value = args[k] if k < len(args) else named.get(flag)
+            if type(value).__name__ not in _TRUTHS:
+                raise InputError(
+                    f"{name}: {flag} is {_shown(value)}, of the type {type(value).__name__}; give True or False"
+                )
         try:
             return function(*args, **named)
         except (InputError, ComputationError):
@@ -88,10 +99,13 @@ def _misfit(function: Callable[..., Any], args: tuple[Any, ...], named: Mapping[
     for key, hint in hints.items():
         for name, value in _named(given.signature.parameters.get(key), given.arguments):
             if not _fits(value, hint):
-                shown = repr(value)
-                shown = shown if len(shown) <= _SHOWN else f"{shown[:_SHOWN]}..."
-                return f"{name} is {shown}, of the type {type(value).__name__}; give {_in_words(hint)}"
+                return f"{name} is {_shown(value)}, of the type {type(value).__name__}; give {_in_words(hint)}"
     return None
+
+
+def _shown(value: Any) -> str:
+    shown = repr(value)
+    return shown if len(shown) <= _SHOWN else f"{shown[:_SHOWN]}..."
 
 
 def _named(parameter: Parameter | None, given: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:

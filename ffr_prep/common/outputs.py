@@ -91,6 +91,21 @@ def check_output(path: Path) -> None:
         )
 
 
+def check_folder(what: str, path: Path) -> None:
+    """InputError where a folder for several files is asked for and a file stands there, or above it."""
+    there = next((at for at in (path, *path.parents) if at.exists()), path)
+    if there.exists() and not there.is_dir():
+        raise InputError(f"{what} {path}: {there} is a file; name a folder")
+
+
+def made_folder(what: str, path: str | Path) -> Path:
+    """The folder, made if it is not there. InputError as `check_folder`."""
+    path = Path(path)
+    check_folder(what, path)
+    path.mkdir(parents=True, exist_ok=True)
+    return path
+
+
 @contextmanager
 def replacing(path: str | Path) -> Iterator[Path]:
     """Yields the working file to write; at the end of the block it replaces `path`, which until then stays as it was.

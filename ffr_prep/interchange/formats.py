@@ -96,7 +96,8 @@ def export_body(body: FlexibleBody, path: Path, surface: bool, settings: Mapping
         raise InputError(f"{path}: {entry.name} can be read only; {_suffixes('write')} can be written")
     given = arguments(entry, settings)
     loaded(entry.write)(body, path, surface=surface, **given)
-    return () if entry.left_out is None else tuple(loaded(entry.left_out)(body, **given))
+    parts = ("the format has no parts: the body is written in one piece, for small deflections",) if body.parts else ()
+    return parts if entry.left_out is None else (*parts, *loaded(entry.left_out)(body, **given))
 
 
 def import_body(path: Path, *, units: str = "m-kg-s") -> FlexibleBody:

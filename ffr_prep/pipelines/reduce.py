@@ -177,9 +177,18 @@ def _with_cut_error(body: FlexibleBody) -> FlexibleBody:
     return replace(body, provenance={**body.provenance, **found, "warnings": warnings})
 
 
+def _check_asked(model: Model, request: Request) -> None:
+    """InputError where the modes that are asked for by number have too large a second order: before the search for them,
+    which may take hours."""
+    asked, size = getattr(request.reduction, "modes", None), model.coupled.K.shape[0]
+    if isinstance(asked, int | np.integer) and 0 < asked <= size and not (request.linear or model.unstressed):
+        check_size(int(asked), len(model.coupled.names), model.surface(np.zeros((size, 0))), request.drawn_modes)
+
+
 def _reduced(model: Model, request: Request, progress: Stages, advance: Advance) -> FlexibleBody:
     coupled = model.coupled
     L = functionals(request.reference, coupled)
+    _check_asked(model, request)
     progress("factorise the stiffness")
     body = factorised(coupled, request.solver, advance)
     progress("reduce")

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-import numpy as np
-
+from ffr_prep.body import cut_pair, paired
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError
 from ffr_prep.model.coupled import CoupledModel
@@ -17,7 +16,6 @@ from ffr_prep.reduction.receptance import free_modes, receptance_error, referenc
 from ffr_prep.reduction.selection import Accuracy, Selection, UpTo
 from ffr_prep.solvers.factor import FreeBody, SupportedBody
 
-_SAME = 1e-3  # relative difference of frequencies that a symmetric body has twice: that of its mesh
 _RICHER = (2.0, 4.0, 8.0, 16.0)  # times the band: where modes are looked for
 
 
@@ -44,23 +42,6 @@ def selected(
         with_modes(omega2[:selection], modes[:, :selection]), warnings=cut_pair(omega2, selection, "normal modes")
     )
     return _verified(model, held, basis, omega2[:selection], modes[:, :selection])
-
-
-def cut_pair(omega2: Array, count: int, what: str) -> tuple[str, ...]:
-    """Says so when the first mode that is left out, of those of ascending omega2, has the frequency of the last one kept."""
-    if not 0 < count < omega2.size or not _paired(omega2)[count - 1]:
-        return ()
-    alone = np.flatnonzero(~_paired(omega2)[: count - 1])
-    fewer = f", or for {alone[-1] + 1}" if alone.size else ""
-    return (
-        f"the number of {what}, {count}, cuts a pair of equal frequency ({np.sqrt(omega2[count]) / (2 * np.pi):.4g} Hz), as "
-        f"round and square bars have them: one plane is left stiffer than the other; ask for {count + 1}{fewer}",
-    )
-
-
-def _paired(omega2: Array) -> Array:
-    """(p - 1,) whether a mode and the next one have the same frequency, but for what a mesh makes of it."""
-    return np.diff(omega2) <= 2 * _SAME * omega2[1:]
 
 
 def _verified(model: CoupledModel, held: SupportedBody, basis: Basis, omega2: Array, modes: Array) -> Basis:
@@ -102,7 +83,7 @@ def _accurate(
             enough, best = count, basis
         else:
             few = count
-    if enough < omega2.size and enough and _paired(omega2)[enough - 1]:
+    if enough < omega2.size and enough and paired(omega2)[enough - 1]:
         enough += 1
         best = with_modes(omega2[:enough], modes[:, :enough])
     best = replace(best, warnings=resolution_warnings(model, omega2, modes, wanted.band.high))

@@ -24,7 +24,7 @@ from matplotlib.patches import Rectangle
 from ffr_prep.body import FlexibleBody, Surface
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError, InputError
-from ffr_prep.common.outputs import replacing
+from ffr_prep.common.outputs import check_folder, replacing
 
 COLOUR_MAP = "viridis"
 _LARGEST = 0.08  # of the diagonal of the body: deflection that is seen well and still looks like the body
@@ -63,15 +63,15 @@ def mode_pictures(
 
     >>> fp.mode_pictures(body, "modes")
     """
-    folder = Path(folder)
     numbers = list(range(1, min(body.n, 6) + 1)) if modes is None else list(modes)
-    surface = _drawable(body, numbers)
+    surface, folder = _drawable(body, numbers), Path(folder)
+    check_folder("the folder of pictures", folder)
     factors = [_factor(surface, k, scale) for k in numbers]
     shapes = [surface.Phi[:, :, k - 1] for k in numbers]
     camera = camera_of(surface.points, [factor * shape for factor, shape in zip(factors, shapes, strict=True)])
     images = list(_render(surface, shapes, factors, camera))
     folder.mkdir(parents=True, exist_ok=True)
-    paths = []
+    paths = list[Path]()
     for k, shape, factor, image in zip(numbers, shapes, factors, images, strict=True):
         paths.append(folder / f"mode_{k:02d}.png")
         save_figure(_picture(body, k, shape, factor, image, camera), paths[-1])

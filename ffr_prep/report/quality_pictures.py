@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 
 from ffr_prep.body import FlexibleBody
 from ffr_prep.common.errors import InputError
+from ffr_prep.common.outputs import made_folder
 from ffr_prep.reduction.quality import ACCELERATIONS, Quality, quality_of
 from ffr_prep.report.mode_pictures import save_figure
 
@@ -29,8 +30,7 @@ def quality_pictures(body: FlexibleBody, folder: str | Path) -> list[Path]:
     quality = quality_of(body.provenance)
     if quality is None:
         raise InputError(f"body {body.name!r} was not compared with its full model; make it again with --quality")
-    folder = Path(folder)
-    folder.mkdir(parents=True, exist_ok=True)
+    folder = made_folder("the folder of pictures", folder)
     figures = {"errors.png": _errors(body, quality)}
     if quality.points:
         figures = {"receptances.png": _receptances(body, quality)} | figures

@@ -184,7 +184,9 @@ def checked_noise(psd: Sequence[tuple[float, float]]) -> Array:
 
 def _checked(frequencies: Sequence[float], band_of: tuple[float, float] | None) -> Array:
     """(F,) [Hz]. InputError for frequencies that are none, and for a band that does not rise from above zero."""
-    found = np.array(frequencies, float).ravel()
+    if np.ndim(frequencies) != 1:
+        raise InputError(f"frequencies is {frequencies!r}; give a list of them [Hz], such as [10.0, 20.0]")
+    found = np.array(frequencies, float)
     if not np.isfinite(found).all() or found.min(initial=0.0) < 0:
         raise InputError(f"frequencies {list(frequencies)}: each must be finite and not negative [Hz]")
     if band_of is not None:

@@ -10,13 +10,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.linalg
 
+from ffr_prep.body import cut_pair
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 from ffr_prep.model.coupled import CoupledModel
 from ffr_prep.reduction.basis import Basis, check_interfaces
 from ffr_prep.reduction.methods.craig_bampton import with_fixed_interfaces
 from ffr_prep.reduction.modes import constraint_modes
-from ffr_prep.reduction.selected_modes import cut_pair
 from ffr_prep.reduction.selection import Selection, UpTo, check_selection
 from ffr_prep.solvers.factor import FreeBody, supported
 

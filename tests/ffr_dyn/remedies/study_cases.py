@@ -147,6 +147,7 @@ CASES = [
     Case(p(points, {"a": SHORT, "b": LONG}, paired=True), p(points, {"a": SHORT, "b": SHORT}, paired=True)),
     Case(p(spaced, 0, np.inf, 2), p(spaced, 0, 1, 2)),
     Case(asked(G, samples=4), asked(G)),
+    Case(asked(G, seed=1), asked(G)),
     Case(asked({"g": NORMAL}, samples=4, seed=-1), asked({"g": NORMAL}, samples=4, seed=1)),
     Case(asked(G, {**ANGLE, "twice": "= angle * t"}), asked(G, {**ANGLE, "twice": "= 2 * angle"})),
     Case(asked(G, {**ANGLE, "a": "= b", "b": "= a"}), asked(G, {**ANGLE, "a": "= 2 * angle", "b": "= a"})),

@@ -14,6 +14,7 @@ import pytest
 from places import ROOT
 
 import ffr_dyn as fd
+import ffr_dyn.studies.runs
 import ffr_prep.cli
 from ffr_dyn.results.result import Quantity, Result
 from ffr_dyn.studies import draw
@@ -225,6 +226,11 @@ def test_a_run_that_fails_is_a_row_with_its_message(folder):
     assert np.isfinite(table["angle"][[0, 2]]).all()
     with pytest.raises(ComputationError, match="no run has succeeded; the first says"):
         fd.sweep(fd.study(folder / "bar.toml", {"g": [1, 2]}, {"x": "hinge.torque: last"}), folder / "u.nc", workers=0)
+    none = fd.load_table(folder / "u.nc")
+    assert none.failed.tolist() == [0, 1]
+    assert all("hinge.torque" in message for message in none.messages)
+    assert none["g"].tolist() == [1, 2]
+    assert not (folder / "u.nc.journal").exists()
 
 
 def test_an_output_that_a_run_has_not_leaves_the_others(folder):
@@ -281,6 +287,8 @@ def test_a_formula_of_an_item_that_a_run_has_not_is_nan(folder):
     (("g = [1", "g = [true"), r"parameters.g = \[True, .*finite numbers"),
     (("to = 2.0", "to = inf"), "parameters.length: from and to are numbers, both with a unit or both in SI"),
     (("scene =", "seed = -1\nscene ="), "seed is -1; give a whole number, 0 or more"),
+    (("scene =", "seed = 3\nscene ="), "seed = 3 changes nothing: no parameter has a distribution"),
+    (("scene =", "sampling = 'sobol'\nscene ="), "sampling = sobol changes nothing: no parameter has a distribution"),
     (("scene =", "samples = 10\nscene ="), "samples = 10 changes nothing: no parameter has a distribution"),
     (("= force / g", "= forc / g"), "outputs.weight: in the formula 'forc / g', 'forc' is not known; did you mean 'force'"),
     (("= force / g", "= force / hinge.g"), "'hinge.g' is no output and no parameter"),
@@ -601,3 +609,10 @@ def test_entries_of_structure_files_and_of_scenes_are_varied(tmp_path):
     assert (table["stable"] == 1).all()
     assert np.allclose(sag[d == 0.01] / sag[d == 0.02], 4.0, rtol=1e-3)
     assert np.allclose(sag / np.abs(table["gravity.2"]) * d**2, sag[0] / 9.81 * 1e-4, rtol=1e-3)
+    damaged = next((tmp_path / "t.nc.bodies").glob("*.ffr"))
+    damaged.write_bytes(damaged.read_bytes()[:500])
+    ffr_dyn.studies.runs._body.cache_clear()
+    said = fd.sweep(study, tmp_path / "again.nc", workers=0, cache=tmp_path / "t.nc.bodies").messages
+    assert sum(bool(message) for message in said) == 2
+    assert all("delete it, and the study makes it anew" in message for message in said if message)
+    assert not any("ffr-prep reduce" in message for message in said)

@@ -53,16 +53,17 @@ def test_a_sound_body_raises_no_doubt():
 
 
 def test_a_point_far_from_its_place_is_told():
-    """On the surface between its nodes and inside is near enough; beside the body is not, in whole and in parts."""
+    """On the surface between its nodes is near enough; beside the body and inside is not, in whole and in parts."""
     ends = [fp.InterfaceRegion("left"), fp.InterfaceRegion("right")]
     model = fp.from_mesh(box_mesh("hex8", (0.3, 0.02, 0.02), (6, 1, 1)), STEEL, ends)
     bar = fp.reduce(model, fp.Request(name="bar", reference=fp.MeanAxis(), reduction=fp.Guyan(), parts=2))
-    for near in ((0.17, 0.02, 0.0), (0.15, 0.01, 0.01)):
+    for near in ((0.17, 0.02, 0.0), (0.15, 0.01, 0.0), (0.15, 0.019, 0.02)):
         assert fp.units_doubts(fp.with_point(bar, "p", near)) == []
+    assert "0.0141 m away: is that meant?" in fp.units_doubts(fp.with_point(bar, "p", (0.15, 0.01, 0.01)))[0]
     far = fp.with_point(fp.with_point(bar, "p", (0.2, 0.1, 0.0)), "q", (0.2, 0.0, 0.0))
     assert fp.units_doubts(far) == [
         "its point 'p' was asked for at (0.2, 0.1, 0) m and is where the surface is nearest, at (0.2, 0.02, 0) m, 0.08 m "
-        "away: is that meant?"
+        "away: is that meant? Within a body, as on the axis of a beam, interfaces of its reduction can be"
     ]
     assert [len(fp.units_doubts(part)) for part in far.parts] == [0, 1]
     assert fp.units_doubts(fp.with_reference(far, fp.FixedTo("left"))) == fp.units_doubts(far)
@@ -102,3 +103,15 @@ def test_a_rotor_whose_points_are_all_at_its_axis_is_not_doubted(eccentricity):
     at = {"centre_of_mass": (eccentricity, 0, 0), "points": {"c": (0, 0, 0)}}
     assert not fp.units_doubts(fd.rigid_body("disc", mass=2.0, inertia=(0.01, 0.01, 0.02), **at))
     assert fp.units_doubts(fd.rigid_body("disc", mass=2.0, inertia=(1e4, 1e4, 2e4), **at))
+
+
+@pytest.mark.parametrize("section", [fp.circle(0.04), fp.rectangle(0.04, 0.04), fp.box(0.04, 0.06, 0.003)])
+def test_a_point_on_the_axis_of_a_beam_is_told(section):
+    """Its nodes are those of the outline, 20 mm and more from the axis, where a load would twist the beam: at the end as
+    elsewhere. At a node of the outline nothing is told."""
+    line = fp.polyline([(0, 0, 0), (2, 0, 0)], fp.Member(section, STEEL, (0, 1, 0)), elements=8)
+    model = fp.from_frame(fp.named(line, a=(0, 0, 0)), [fp.InterfaceRegion("a")])
+    rod = fp.reduce(model, fp.Request(name="rod", reference=fp.FixedTo("a"), reduction=fp.Eigenmodes(4)))
+    assert fp.units_doubts(fp.with_point(rod, "p", rod.surface.points[30])) == []
+    for x in (0.9, 1.0, 2.0):
+        assert f"'p' was asked for at ({x:g}, 0, 0) m" in fp.units_doubts(fp.with_point(rod, "p", (x, 0.0, 0.0)))[0]

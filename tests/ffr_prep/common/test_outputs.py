@@ -21,7 +21,7 @@ from ffr_prep.body import load_body, save_body
 from ffr_prep.common.children import ending_with_us
 from ffr_prep.common.errors import ComputationError, InputError
 from ffr_prep.common.interrupts import Interrupted, ending_in_order, undisturbed
-from ffr_prep.common.outputs import command_inputs, note_input, part_of, replacing, reserved
+from ffr_prep.common.outputs import command_inputs, made_folder, note_input, part_of, replacing, reserved
 
 SCENE = """
 [analysis]
@@ -321,3 +321,11 @@ def test_damaged_compiled_code_is_made_anew(tmp_path, suffix, damage):
     path.write_bytes({"truncated": content[:half], "empty": b"", "zeros": content[:half] + bytes(half)}[damage])
     assert run() == "42 0\n"
     assert run() == "42 1\n"
+
+
+def test_a_file_in_the_place_of_a_folder_is_named(tmp_path):
+    (tmp_path / "pictures").write_text("")
+    for path in (tmp_path / "pictures", tmp_path / "pictures" / "modes"):
+        with pytest.raises(InputError, match=r"the folder of pictures .*: .*pictures is a file; name a folder"):
+            made_folder("the folder of pictures", path)
+    assert made_folder("the folder of pictures", tmp_path / "a" / "b").is_dir()

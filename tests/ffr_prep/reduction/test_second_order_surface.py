@@ -353,13 +353,13 @@ def test_second_orders_too_large_are_refused(monkeypatch):
     """Before anything is computed for them; what is remedied goes through."""
     request = fp.Request(name="b", reference=FIXED, reduction=CraigBampton(4))
     model = beam(KINDS[0])
-    monkeypatch.setattr(of_surfaces, "MOST", 1e5)
+    monkeypatch.setattr(of_surfaces, "MOST", 3e5)
     with pytest.raises(fp.InputError, match=r"surface needs 55 static problems .* of 10 modes: .*drawn_modes"):
         fp.reduce(model, request)
     assert fp.reduce(model, replace(request, drawn_modes=2)).stiffening is not None
-    monkeypatch.setattr(of_surfaces, "MOST", 1e4)
-    with pytest.raises(fp.InputError, match=r"load matrices of 10 modes and 2 interfaces .* leave them out \(linear\)"):
-        fp.reduce(model, request)
+    monkeypatch.setattr(of_surfaces, "MOST", 5e3)
+    with pytest.raises(fp.InputError, match=r"load matrices of 6 modes and 2 interfaces .* leave them out \(linear\)"):
+        fp.reduce(model, replace(request, reduction=fp.Guyan()))
     assert fp.reduce(model, replace(request, linear=True)).stiffening is None
 
 
@@ -371,3 +371,22 @@ def test_hundreds_of_modes_are_refused_by_default():
         of_surfaces.check_size(300, 2, shown, None)
     of_surfaces.check_size(300, 2, shown, 60)
     of_surfaces.check_size(300, 2, None, None)
+
+
+def test_modes_that_are_too_many_are_refused_before_they_are_looked_for(monkeypatch):
+    """By number they are known; up to a frequency they are not, and are refused after the search."""
+    line = polyline([(0, 0, 0), (1, 0, 0)], Member(rectangle(0.05, 0.065), STEEL, (0, 1.0, 0)), elements=8)
+    model, said = fp.from_frame(named(line, a=(0, 0, 0)), [fp.InterfaceRegion("a")]), list[str]()
+    monkeypatch.setattr(of_surfaces, "MOST", 1e5)
+
+    def refused(reduction: fp.Reduction) -> list[str]:
+        said.clear()
+        request = fp.Request(name="bar", reference=fp.FixedTo("a"), reduction=reduction)
+        with pytest.raises(fp.InputError, match=r"surface needs \d+ static problems"):
+            fp.reduce(model, request, progress=said.append)
+        return said
+
+    assert refused(fp.Eigenmodes(12)) == []
+    assert refused(fp.CraigBampton(np.int64(12))) == []
+    assert "reduce" in refused(fp.Eigenmodes(fp.UpTo(5000.0)))
+    fp.reduce(model, fp.Request(name="bar", reference=fp.FixedTo("a"), reduction=fp.Eigenmodes(12), linear=True))
