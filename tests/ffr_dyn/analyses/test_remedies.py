@@ -875,6 +875,10 @@ INPUT = [
         lambda: fd.campbell(CLOUD, speeds=(1.0, 2.0), turn="hinge"),
     ),
     Case(
+        lambda: fd.response(HINGED, input="hinge.moment", outputs=["bar.b.position.x"], frequencies=3),
+        lambda: fd.response(HINGED, input="hinge.moment", outputs=["bar.b.position.x"], frequencies=[3.0]),
+    ),
+    Case(
         lambda: fd.response(HINGED, input="hing.moment", outputs=["bar.b.position.x"]),
         lambda: fd.response(HINGED, input="hinge.moment", outputs=["bar.b.position.x"], frequencies=[1.0]),
     ),

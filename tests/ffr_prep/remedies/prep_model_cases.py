@@ -105,6 +105,10 @@ def cut(parts: object, *interfaces: InterfaceRegion, mesh: fp.Mesh | None = None
     return reduced(*(interfaces or (LEFT, RIGHT)), mesh=mesh or long(), parts=parts, reduction=fp.Guyan())
 
 
+def requested(**flags: object) -> object:
+    return fp.Request(name="bar", reference=fp.FixedTo("root"), reduction=fp.Guyan(), **flags)
+
+
 def placed(conditions: fp.FixedTo) -> object:
     """Where two interfaces lie in one plane."""
     return at_interfaces(conditions, ("one", "other"), np.zeros((2, 3)))
@@ -117,6 +121,7 @@ CONDITIONS = [
     Case(p(InterfaceRegion, "a", point=(0, 0)), p(InterfaceRegion, "a", point=(0, 0, 0))),
     Case(p(held, fp.FixedTo("lift")), p(held, fp.FixedTo("left"))),
     Case(p(placed, fp.FixedTo("plane x=0")), p(placed, fp.FixedTo("one"))),
+    Case(p(requested, linear="yes"), p(requested, linear=True)),
     Case(
         p(solids, LEFT, InterfaceRegion("side", "left", "mean")),
         p(solids, LEFT, InterfaceRegion("side", "right", "mean")),
