@@ -1,8 +1,8 @@
 """Rows that rigid bodies leave dependent, and that modes move by next to nothing: redundant.
 
-A slider-crank has its motion in a plane, and three rows too many in space. A rod with modes of the plane alone, of a mesh that
-is not quite symmetric about it, moves them by 1e-5 or so of what a mode across it would. Taken for all that gives way there,
-it made reactions across the plane of 1e4 times those in it, and held the rod against its own modes in the plane.
+A slider-crank has its motion in a plane, and three rows too many in space. A rod with modes of the plane alone, of a mesh
+that is not quite symmetric about it, moves them by 1e-5 or so of what a mode across it would. Taken for all that gives way
+there, it made reactions across the plane of 1e4 times those in it, and held the rod against its own modes in the plane.
 """
 
 from dataclasses import replace
