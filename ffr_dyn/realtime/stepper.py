@@ -100,7 +100,9 @@ class Stepper(Brief):
         self._arrays = tuple(array for loop in self._loops for array in loop.arrays())
         self._set = {name: _Setting(self._loops, name) for name in self._system.inputs}
         self._advance(0)
-        self._outputs, self._computed = _outputs(self._loops[0], outputs, readers)  # which are computed of what there is
+        self._outputs, self._computed = _outputs(
+            self._loops[0], outputs, readers
+        )  # which are computed of what there is
         self._seen = nothing_seen(assembled, method, *held(scene, stabilisation))
 
     def _title(self) -> str:
