@@ -73,7 +73,8 @@ class Assembled(Brief):
     """A consistent state and the compiled scene.
 
     system   : with independent constraint rows, for the motion
-    all_rows : with all of them and a relaxed multiplier matrix, for the reactions; None where no row is redundant
+    all_rows : with all of them and a relaxed multiplier matrix, for the reactions; None where no row is redundant, or
+               deformation moves some that are by next to nothing
 
     x, v : (X,) positions and (V,) velocities (see `Layout`);  notes : what was changed and what is redundant, in words
     degrees_of_freedom : velocities left free by the constraints, elastic ones included
@@ -116,10 +117,9 @@ def assemble(scene: Scene, *, time: float = 0.0) -> Assembled:
     if found.singular:
         v = going_on(rows, x, v)
     count = sum(len(block.words) for block in kept)
-    notes = [
-        f"{block}: the row '{text}' is redundant; of the reactions that are possible the smallest are given"
-        for block, text in redundant
-    ] + left_out
+    share, weak = held_by_next_to_nothing(rows, x, here.J) if redundant else (0.0, [])
+    carried = "it carries nothing" if weak else "of the reactions that are possible the smallest are given"
+    notes = [f"{block}: the row '{text}' is redundant; {carried}" for block, text in redundant] + left_out
     if found.singular:
         notes.insert(0, BRANCHES)
     notes = flat.notes + shifted(scene, place, guess, x) + _slowed(scene, place, given, v) + notes
@@ -128,7 +128,6 @@ def assemble(scene: Scene, *, time: float = 0.0) -> Assembled:
             f"the scene is planar (normal {scene.plane}): computed in the plane, with in-plane modes without their rounding "
             "across it"
         )
-    share, weak = held_by_next_to_nothing(rows, x, here.J) if redundant else (0.0, [])
     notes += _weakly_held(share, weak)
     notes += [*sliding_notes(scene), *_idle(scene), *_uncounted(rows, x), *body_doubts(scene)]
     notes += held_frequencies(
