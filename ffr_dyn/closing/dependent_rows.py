@@ -13,10 +13,12 @@ import numpy as np
 from ffr_dyn.closing.constraints import Constraints
 from ffr_dyn.closing.positions import weights
 from ffr_dyn.closing.row_space import Dependence, Matrix, dependence, row_lengths
+from ffr_dyn.equations.layout import Layout
 from ffr_prep.common.arrays import Array
 
-YIELDS = 1e-3  # of a row of length one, what deformation has to move it by
+YIELDS = 1e-2  # of what moves the rows of flexible bodies, what deformation has to do against a combination of them
 EXACT = 1e-8  # the same, what is rounding
+ALONE = 1e-10  # of combinations of rows, the part on flexible bodies of those that have none
 TAKES_PART = 1e-3  # of a row in a combination
 
 
@@ -40,15 +42,37 @@ def held_by_next_to_nothing(constraints: Constraints, x: Array, J: Matrix) -> tu
 
 
 def _of_rigid_bodies(constraints: Constraints, x: Array, J: Matrix) -> tuple[Array, Array, float]:
-    """(C, d) orthonormal combinations of rows that vanish for rigid bodies, (d,) by how much all that moves them does, and
-    the length of the shortest that does not vanish."""
+    """(C, d) orthonormal combinations of rows of length one that vanish for rigid bodies, (d,) by how much deformation moves
+    each, rising, and the length of the shortest that does not vanish.
+
+    What deformation does is measured by what moves the rows of flexible bodies, row by row, so that it does not depend on how
+    light the bodies beside them are.
+    """
     scene, place, dense = constraints.scene, constraints.place, isinstance(J, np.ndarray)
     stiff = J @ weights(scene, place, x, False, dense)
     rigid = dependence(stiff)
     if not rigid.count or not any(place.n):
         return rigid.combinations, np.zeros(rigid.count), rigid.least
     whole = J @ weights(scene, place, x, True, dense)
-    lengths = row_lengths(whole)
-    Z = np.linalg.qr(rigid.combinations * (lengths / row_lengths(stiff))[:, None])[0]
-    turn, moved, _ = np.linalg.svd(np.asarray((whole.T @ (Z / lengths[:, None])).T))
-    return Z @ turn, np.append(moved, np.zeros(len(turn) - moved.size)), rigid.least
+    pulls = rigid.combinations / row_lengths(stiff)[:, None]
+    turn, moved = _by_deformation((whole.T @ pulls).T, pulls * _on_flexible_bodies(place, whole)[:, None])
+    return np.linalg.qr((pulls @ turn) * row_lengths(whole)[:, None])[0], moved, rigid.least
+
+
+def _by_deformation(E: Array, F: Array) -> tuple[Array, Array]:
+    """(d, d) combinations of d columns, and how long each is in E (d, V) where it has length one in F (C, d), rising; zero
+    where it has none in F."""
+    _, size, rows = np.linalg.svd(F, full_matrices=False)
+    alone = size <= ALONE * max(float(size[0]), 1e-300)
+    whitened = rows[~alone].T / size[~alone]
+    turn, moved, _ = np.linalg.svd(whitened.T @ E)
+    moved = np.append(moved, np.zeros(len(turn) - moved.size))[::-1]
+    return np.hstack([rows[alone].T, whitened @ turn[:, ::-1]]), np.append(np.zeros(int(alone.sum())), moved)
+
+
+def _on_flexible_bodies(place: Layout, whole: Matrix) -> Array:
+    """(C,) the lengths of the rows with what moves flexible bodies alone."""
+    columns = [k for b, n in enumerate(place.n) if n for k in range(place.iv[b], place.iv[b] + 6 + n)]
+    part = whole[:, columns]
+    found: Array = np.sqrt(np.asarray((part * part).sum(axis=1)).ravel())
+    return found
