@@ -33,6 +33,8 @@ def dependence_at(constraints: Constraints, x: Array, J: Matrix) -> Dependence:
 def held_by_next_to_nothing(constraints: Constraints, x: Array, J: Matrix) -> tuple[float, list[str]]:
     """By how much deformation moves rows that `dependence_at` calls dependent, and the joints whose rows these are; none
     where that is rounding."""
+    if not any(constraints.place.n):
+        return 0.0, []
     found, moved, _ = _of_rigid_bodies(constraints, x, J)
     weak = (moved < YIELDS) & (moved > EXACT)
     owners = [block.name for block in constraints.blocks for _ in block.words]
