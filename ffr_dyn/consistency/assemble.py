@@ -34,11 +34,12 @@ from ffr_dyn.functions.overshoots import overshoots
 from ffr_dyn.scene.followed import TURN
 from ffr_dyn.scene.force_kinds import forces_of
 from ffr_dyn.scene.parts import owner, wholes
-from ffr_dyn.scene.scene import Body, Scene, length_of, measured_body, require_scene
+from ffr_dyn.scene.scene import Body, Scene, altered, length_of, measured_body, require_scene
 from ffr_dyn.scene.sensors import Measurement
 from ffr_dyn.variants.in_line import in_line
 from ffr_dyn.variants.mean_axis import in_mean_axis_frames
-from ffr_dyn.variants.plane import level_in_space, obstacles, planar_forms
+from ffr_dyn.variants.planar_loops import loops_in_plane
+from ffr_dyn.variants.plane import obstacles, planar_forms
 from ffr_prep.body import (
     CUT_PAIR,
     cut_doubt,
@@ -338,8 +339,8 @@ def _in_plane_or_space(scene: Scene, time: float) -> Flat:
             said = ", as the scene says" * (scene.plane == flat.plane)
             rows = constraints_of(flat, without(blocks, across), time)
             return Flat(flat, rows, f"in the plane, normal {flat.plane}{said}", notes)
-    whole, notes = in_line(level_in_space(scene))
-    return Flat(whole, constraints_of(whole, blocks_of(whole), time), _in_space(scene, found), notes)
+    whole, more = loops_in_plane(altered(lined, plane="none"))
+    return Flat(whole, constraints_of(whole, blocks_of(whole), time), _in_space(scene, found), notes + more)
 
 
 def _in_space(scene: Scene, found: dict[str, str]) -> str:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -68,7 +69,7 @@ def _on_same_bodies(scene: Scene) -> Iterator[tuple[Joint, list[Joint]]]:
 
 def _put(scene: Scene, base: Joint, joint: Joint) -> tuple[Scene | None, float]:
     """The scene with a joint where the base lets it be, and how far it was off [m]; None where that is none, or no hair."""
-    first, now = _places(scene, base), _places(scene, joint)
+    first, now = places_of(scene, base), places_of(scene, joint)
     points = _points(base, joint, first, now)
     axes = {b: now[b].frame[:, H] for b in first}
     if joint.kind != BALL:
@@ -79,11 +80,13 @@ def _put(scene: Scene, base: Joint, joint: Joint) -> tuple[Scene | None, float]:
     off = max(shift, length * turn)
     if not ROUNDING * length < off <= HAIR * length:
         return None, off
-    wanted = {b: Place(points[b], _frame(now[b].frame, axes[b])) for b in first}
-    return _with(scene, joint, wanted), off
+    frames_of = {b: now[b].frame if joint.kind == BALL else _frame(now[b].frame, axes[b]) for b in first}
+    wanted = {b: Place(points[b], frames_of[b]) for b in first}
+    return with_places(scene, joint, wanted), off
 
 
-def _places(scene: Scene, joint: Joint) -> Places:
+def places_of(scene: Scene, joint: Joint) -> Places:
+    """Of the joint as the scene has it, by number of the body, that of the ground the last."""
     table, found = markers(scene), Places()
     for end, frame in zip((joint.i, joint.j), frames(joint), strict=True):
         b, _, point = table[marker_number(scene, end)]
@@ -117,26 +120,29 @@ def _frame(frame: Array, h: Array) -> Array:
     return np.column_stack([f, cross(h, f), h])
 
 
-def _with(scene: Scene, joint: Joint, wanted: Places) -> Scene:
-    """The scene with a joint at other places of its bodies."""
-    table = markers(scene)
+def with_places(scene: Scene, joint: Joint, wanted: Places) -> Scene:
+    """The scene with a joint at other places of its bodies, itself where it has them."""
+    now, table = places_of(scene, joint), markers(scene)
     ends = [table[marker_number(scene, end)] for end in (joint.i, joint.j)]
-    bodies, ground = list(scene.bodies), dict(scene.ground)
+    bodies, ground, changes = list(scene.bodies), dict(scene.ground), dict[str, Any]()
     for b, _, point in ends:
+        if np.array_equal(now[b].point, wanted[b].point):
+            continue
         if b == len(bodies):
             ground[point] = wanted[b].point
+            changes["ground"] = ground
         else:
             bodies[b] = altered(bodies[b], model=_moved(bodies[b].model, point, wanted[b].point))
-    if joint.kind != BALL:
+            changes["bodies"] = tuple(bodies)
+    if any(not np.array_equal(now[b].frame, wanted[b].frame) for b, _, _ in ends):
         i, j = (wanted[b].frame for b, _, _ in ends)
-        joint_there = replace(joint, axis=i, axis_j=j)
-        joints = tuple(joint_there if other is joint else other for other in scene.joints)
-        return altered(scene, bodies=tuple(bodies), ground=ground, joints=joints)
-    return altered(scene, bodies=tuple(bodies), ground=ground)
+        turned = replace(joint, axis=i, axis_j=j)
+        changes["joints"] = tuple(turned if other.name == joint.name else other for other in scene.joints)
+    return altered(scene, **changes) if changes else scene
 
 
 def _moved(model: FlexibleBody, name: str, point: Array) -> FlexibleBody:
-    """A rigid body with one of its places elsewhere."""
+    """A body with one of its places elsewhere, a hair from where it was."""
 
     def make() -> FlexibleBody:
         moved = (replace(i, position=point) if i.name == name else i for i in model.interfaces)

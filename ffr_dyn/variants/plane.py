@@ -67,18 +67,6 @@ def planar_forms(scene: Scene) -> Iterator[Scene]:
                 yield _in_plane(level, normal)
 
 
-def level_in_space(scene: Scene) -> Scene:
-    """A scene that is computed in space, with places that are a hair beside a plane that its motion may keep to in it.
-
-    Joints of rigid bodies there that hold one another in the plane do not close otherwise.
-    """
-    scene = altered(scene, plane="none")
-    for normal in range(3):
-        if not any(True for _ in _across(scene, normal)):
-            scene = levelled(scene, normal)
-    return scene
-
-
 def _check_declared(scene: Scene, normal: int) -> None:
     """InputError where a declared plane would leave out much of what a mode does."""
     for body in scene.bodies:
