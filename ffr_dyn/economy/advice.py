@@ -78,12 +78,14 @@ def _elements(body: Body) -> str:
 
 
 def _highest(found: Economy, b: int) -> float:
-    """[Hz] of the highest mode of a body that the model has, or that would do more than a small share of a tolerance."""
+    """[Hz] of the highest mode of a body that the model has, or that would do more than a small share of a tolerance, where
+    that can be told."""
     part, model = found.choice.parts[b], found.original.bodies[b].model
     V = part.basis(model.n)
     frequencies = list(np.sqrt(np.einsum("ia,i,ia->a", V, model.omega2, V)) / (2 * np.pi))
     shares = (found.effects.effect / found.limits).max(axis=1, initial=0.0)
-    omitted = np.flatnonzero((found.effects.body == b) & (shares > found.policy.advised_effect))
+    counts = (found.effects.body == b) & (shares > found.policy.advised_effect) & found.tells_apart
+    omitted = np.flatnonzero(counts)
     frequencies += [float(model.frequencies[found.effects.mode[k]]) for k in omitted]
     return float(max(frequencies))
 

@@ -196,12 +196,17 @@ def _stiffening(found: Economy, b: int) -> str:
 
 
 def _nearest(found: Economy) -> Table:
-    out = [("left out", *row) for row in _leading(found, found.effects, most=True)]
+    out = [("left out", *row) for row in _leading(found, found.effects, most=True) if found.tells_apart]
     kept = [("kept", *row) for row in _leading(found, found.kept, most=False)]
     text = (
         "What the omitted modes would do to the outputs, the largest first; and what the kept modes do, the smallest first. "
         "In units of the tolerance."
     )
+    if not found.tells_apart:
+        text += (
+            " Omitted modes are not listed: each alone would do more than all of them do, since joints that hold bodies more "
+            "than once let them move only together."
+        )
     return Table("Nearest to mattering", text, ("", "mode", "output", "share"), (*out, *kept))
 
 

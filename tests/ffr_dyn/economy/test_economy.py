@@ -673,6 +673,17 @@ def test_the_report_says_it_all(fast, tmp_path):
         write_report(fast, tmp_path / "r.pdf")
 
 
+def test_omitted_modes_are_not_told_apart_where_each_would_do_more_than_all(fast):
+    """As where joints hold bodies more than once: what is listed fits what is left out, or is not listed."""
+    assert fast.tells_apart
+    assert "left out" in as_text(fast).partition("NEAREST TO MATTERING")[2].partition("TERMS NEAREST")[0]
+    many = replace(fast, effects=replace(fast.effects, effect=1e4 * np.maximum(fast.effects.effect, fast.limits)))
+    nearest = as_text(many).partition("NEAREST TO MATTERING")[2].partition("TERMS NEAREST")[0]
+    assert "Omitted modes are not listed" in nearest
+    assert "left out " not in nearest
+    assert advice(many) == advice(replace(fast, effects=replace(fast.effects, effect=0.0 * fast.effects.effect)))
+
+
 def test_advice_is_a_command_to_run(fast):
     lines = advice(made_by(fast, "reduce", "rod.msh"))
     assert lines[0].startswith("crank: rigid is enough")
