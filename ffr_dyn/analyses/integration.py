@@ -262,10 +262,7 @@ def _begun(
     """The run at its start, or where the file to resume left it."""
     system, gained = assembled.system, gains(stabilisation)
     seen = nothing_seen(assembled, method, *held(system.scene, stabilisation))
-    dropped = assembled.all_rows is not None
-    engine = new_engine(
-        system, assembled.x, assembled.v, method, gained, start=start, spacing=spacing, keeps_passed=dropped
-    )
+    engine = new_engine(system, assembled.x, assembled.v, method, gained, start=start, spacing=spacing)
     moments = np.zeros(0) if fast is None else fast.moments
     energy = EnergyWatch(system, method, gained, spacing, lambda rows: with_all_reactions(assembled, rows), moments)
     if resume is not None and Path(resume).exists():
@@ -594,6 +591,7 @@ def _account(run: _Run, notes: list[str]) -> dict[str, Any]:
     """The attributes that only the end of a run can tell."""
     assembled = run.seen.assembled
     info, drift = run.engine.work.info, run.engine.work.drift
+    ends, spacing = (assembled.x, run.engine.x), run.energy.spacing
     return {
         "evaluations": int(info[EVALUATIONS]),
         "projections": int(info[PROJECTIONS]),
@@ -608,9 +606,7 @@ def _account(run: _Run, notes: list[str]) -> dict[str, Any]:
                 "forward",
                 run.seen,
                 {
-                    SINGULAR: passed_in_words(
-                        assembled.system, assembled.all_rows, run.engine.work, run.energy.spacing
-                    ),
+                    SINGULAR: passed_in_words(assembled.system, assembled.blocks, ends, run.engine.work, spacing),
                     BALANCE: run.energy.amiss(),
                     **between_rows(run.seen, run.engine.system, run.engine.work),
                 },

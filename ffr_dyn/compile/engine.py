@@ -60,19 +60,17 @@ def new_engine(
     *,
     start: float = 0.0,
     spacing: float = 0.0,
-    keeps_passed: bool = False,
 ) -> Engine:
     """Memory for a scene at the state (x, v), which it owns, and for a method (none: evaluations alone).
 
     start   : time of step number 0 [s]
     spacing : of the numbered steps of a method that chooses its own [s]
-    keeps_passed : whether positions beside singular ones are kept (`Work.passed`)
 
     The first engine of a kind waits until what it needs is compiled.
     """
     if method is not None and method.takes_forces:
         system = with_stiff_rows(system)
-    tables, words = new_tables(system, memory_of(system, method, keeps_passed))
+    tables, words = new_tables(system, memory_of(system, method))
     tables.clock.time[SPACING] = spacing
     if method is not None:
         tables.stages.numbers[:] = method.numbers

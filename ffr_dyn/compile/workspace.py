@@ -49,20 +49,18 @@ class _Needs(NamedTuple):
     keeps_passed: bool = False
 
 
-def memory_of(system: System, method: Integrator | None, keeps_passed: bool) -> Piece[Tables]:
+def memory_of(system: System, method: Integrator | None) -> Piece[Tables]:
     """Memory for a scene and a method (none: evaluations alone), to be copied, with the addresses of what they call.
 
     Scenes of one structure have the same; words of the model are left open. The first one of a kind waits until what it
     needs is compiled.
-
-    keeps_passed : whether positions beside singular ones are kept
     """
     kinds: tuple[type[Integrator], ...] = ()
-    needs = _Needs(keeps_passed=keeps_passed)
+    needs = _Needs()
     if method is not None:
         kept = 2 if method.repeatable else 0
         sizes = method.stage_count, method.row_stages, len(method.numbers), kept
-        kinds, needs = (type(method),), _Needs(*sizes, method.controlled, method.keeps_terms, keeps_passed)
+        kinds, needs = (type(method),), _Needs(*sizes, method.controlled, method.keeps_terms, True)
     if not system.structure.shared:
         return _memory(system, kinds, needs)
     return remembered(system.structure, ("memory", kinds, needs), lambda: _memory(system, kinds, needs))

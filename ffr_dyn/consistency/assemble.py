@@ -81,6 +81,7 @@ class Assembled(Brief):
     degrees_of_freedom : velocities left free by the constraints, elastic ones included
     redundant : (joint, row) pairs that follow from the other rows
     computed : in the plane or in space, and why, in words
+    blocks : of all rows, redundant ones among them
 
     >>> fd.assemble(scene).degrees_of_freedom
     """
@@ -93,6 +94,7 @@ class Assembled(Brief):
     notes: tuple[str, ...]
     redundant: tuple[tuple[str, str], ...] = ()
     computed: str = ""
+    blocks: tuple[Block, ...] = ()
 
 
 def assemble(scene: Scene, *, time: float = 0.0) -> Assembled:
@@ -139,7 +141,7 @@ def assemble(scene: Scene, *, time: float = 0.0) -> Assembled:
     system = compile_scene(scene, kept) if redundant else rows.engine.system
     notes += _beyond_tables(system)
     check_memory(system.user, time, x, v)
-    return Assembled(system, all_rows, x, v, free, tuple(notes), tuple(redundant), flat.computed)
+    return Assembled(system, all_rows, x, v, free, tuple(notes), tuple(redundant), flat.computed, rows.blocks)
 
 
 def _weakly_held(share: float, joints: list[str]) -> list[str]:

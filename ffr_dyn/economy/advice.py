@@ -84,10 +84,19 @@ def _highest(found: Economy, b: int) -> float:
     V = part.basis(model.n)
     frequencies = list(np.sqrt(np.einsum("ia,i,ia->a", V, model.omega2, V)) / (2 * np.pi))
     shares = (found.effects.effect / found.limits).max(axis=1, initial=0.0)
-    counts = (found.effects.body == b) & (shares > found.policy.advised_effect) & found.tells_apart
+    counts = (found.effects.body == b) & (shares > found.policy.advised_effect) & tells_apart(found)
     omitted = np.flatnonzero(counts)
     frequencies += [float(model.frequencies[found.effects.mode[k]]) for k in omitted]
     return float(max(frequencies))
+
+
+def tells_apart(found: Economy) -> bool:
+    """Whether what is said of each omitted mode fits what is known of all of them.
+
+    Where joints hold bodies more than once, modes move only with one another, and one alone would do far more.
+    """
+    most = found.effects.effect.max(axis=0, initial=0.0)
+    return bool((most <= found.policy.alone * np.maximum(found.limits, found.model_error)).all())
 
 
 def _mesh_size(body: Body, highest: float, per_wave: int) -> float | None:

@@ -198,6 +198,12 @@ class Policy:
     load_samples: int = number(24, "states", "at which the loads that stiffen are looked at", SET)
     needed_stiffening: float = number(1e-4, "of a stiffness", "a load that changes more is called needed", SET)
     timing_repeats: int = number(3, "runs", "of each point of the chart, whose median time is drawn", READING)
+    alone: float = number(
+        3.0,
+        "times",
+        "what omitted modes do together, or a tolerance: more than one can do alone, which is not listed",
+        READING,
+    )
     advised_effect: float = number(0.02, "tolerance", "modes that do less are not asked for in the advice", SET)
     band: float = number(
         1.5, "times", "the highest frequency that matters: end of the band advised", "rule of component mode synthesis"

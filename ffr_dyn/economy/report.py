@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ffr_dyn.economy.advice import advice
+from ffr_dyn.economy.advice import advice, tells_apart
 from ffr_dyn.economy.checks import load_names
 from ffr_dyn.economy.contributions import Contributions
 from ffr_dyn.economy.inertia_terms import TermEffect
@@ -196,13 +196,13 @@ def _stiffening(found: Economy, b: int) -> str:
 
 
 def _nearest(found: Economy) -> Table:
-    out = [("left out", *row) for row in _leading(found, found.effects, most=True) if found.tells_apart]
+    out = [("left out", *row) for row in _leading(found, found.effects, most=True) if tells_apart(found)]
     kept = [("kept", *row) for row in _leading(found, found.kept, most=False)]
     text = (
         "What the omitted modes would do to the outputs, the largest first; and what the kept modes do, the smallest first. "
         "In units of the tolerance."
     )
-    if not found.tells_apart:
+    if not tells_apart(found):
         text += (
             " Omitted modes are not listed: each alone would do more than all of them do, since joints that hold bodies more "
             "than once let them move only together."

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from ffr_dyn.analyses.settings import Settings
 from ffr_dyn.economy.cache import Tried
 from ffr_dyn.economy.checks import Frequency, StiffeningLoad
@@ -17,8 +15,6 @@ from ffr_dyn.economy.policy import DEFAULT, Policy
 from ffr_dyn.scene.scene import Scene
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.brief import Brief
-
-ALONE = 3.0  # times the tolerance, or what all omitted modes do, which none does alone more than
 
 
 @dataclass(frozen=True, repr=False)
@@ -91,12 +87,3 @@ class Economy(Brief):
     verification: Verification | None
     policy: Policy = DEFAULT
     new_frames: tuple[str, ...] = ()
-
-    @property
-    def tells_apart(self) -> bool:
-        """Whether what is said of each omitted mode fits what is known of all of them.
-
-        Where joints hold bodies more than once, modes move only with one another, and one alone would do far more.
-        """
-        most: Array = self.effects.effect.max(axis=0, initial=0.0)
-        return bool((most <= ALONE * np.maximum(self.limits, self.model_error)).all())

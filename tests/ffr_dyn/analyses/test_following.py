@@ -8,11 +8,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from test_driven_angles import arm
+from test_dyn_plane import slider_crank
 from test_independence import locomotive
 
 from ffr_dyn.analyses.forward import forward
 from ffr_dyn.consistency.assemble import assemble
 from ffr_dyn.functions.formula import formula
+from ffr_dyn.functions.time_functions import polynomial
 from ffr_dyn.integrators import (
     RK4,
     ROS2,
@@ -79,6 +81,17 @@ def test_all_singular_positions_of_a_run_are_listed():
     times = [float(time) for time in re.findall(r"\d+\.\d+", note.split("near t =")[1].split(" s")[0])]
     aligned = [(k * np.pi - 0.7) / 3 for k in range(1, 5)]
     assert all(np.abs(np.array(times) - time).min() < 5e-3 for time in aligned if time < 4)
+
+
+@pytest.mark.parametrize(("step", "stiffer"), [(0.1, 1.0), (0.01, 100.0)])
+def test_bodies_that_a_long_step_makes_stiff_make_no_position_singular(step, stiffer):
+    """A slider-crank in space, which its rod closes by deforming across the plane; its positions are all the same there."""
+    motor = Driver("motor", "main", polynomial(0.3, 1.0))
+    crank, rod, block = slider_crank().bodies
+    rod = replace(rod, model=replace(rod.model, omega2=rod.model.omega2 * stiffer))
+    scene = slider_crank(plane="none", springs=(), loads=(), drivers=(motor,), bodies=(crank, rod, block))
+    result = forward(scene, end=1.0, output_step=0.1, method=ROS2(step), begin="quasi-static")
+    assert [note for note in result.attributes["notes"] if "singular" in note] == []
 
 
 def test_a_redundant_row_that_opens_stops_the_run_by_name():

@@ -36,7 +36,7 @@ from ffr_dyn.analyses.settings import Settings
 from ffr_dyn.cli import cli
 from ffr_dyn.consistency.assemble import assemble
 from ffr_dyn.economy.adaptive import Adaptation, adaptive_forward
-from ffr_dyn.economy.advice import advice
+from ffr_dyn.economy.advice import advice, tells_apart
 from ffr_dyn.economy.cache import Ledger
 from ffr_dyn.economy.contributions import of_motion, of_omitted, of_shapes, own
 from ffr_dyn.economy.cost import of_run, per_evaluation
@@ -675,7 +675,7 @@ def test_the_report_says_it_all(fast, tmp_path):
 
 def test_omitted_modes_are_not_told_apart_where_each_would_do_more_than_all(fast):
     """As where joints hold bodies more than once: what is listed fits what is left out, or is not listed."""
-    assert fast.tells_apart
+    assert tells_apart(fast)
     assert "left out" in as_text(fast).partition("NEAREST TO MATTERING")[2].partition("TERMS NEAREST")[0]
     many = replace(fast, effects=replace(fast.effects, effect=1e4 * np.maximum(fast.effects.effect, fast.limits)))
     nearest = as_text(many).partition("NEAREST TO MATTERING")[2].partition("TERMS NEAREST")[0]

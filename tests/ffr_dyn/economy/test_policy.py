@@ -582,7 +582,7 @@ def found_by(policy: Policy, **more: Any) -> Any:
     """What a search would return, as far as its report is concerned."""
     choice = replace(EVERYTHING, parts=(Part((0,)), Part(())))
     given = {"policy": policy, "limits": ONE, "original": SCENE, "probe": OF, "choice": choice, "frequencies": ()}
-    given["new_frames"] = ()
+    given |= {"new_frames": (), "model_error": ONE}
     return SimpleNamespace(**given | more)
 
 
@@ -725,6 +725,10 @@ FIGURES: dict[str, Figure] = {
     "load_samples": Figure(load_samples, 24),
     "needed_stiffening": Figure(needed_stiffening, ["could go", "needed"]),
     "timing_repeats": Figure(timing_repeats, 3),
+    "alone": Figure(
+        lambda policy, patch: [advice.tells_apart(found_by(policy, effects=effects(size))) for size in around(3.0)],
+        [True, False],
+    ),
     "advised_effect": Figure(
         lambda policy, patch: [advised(policy, size)[0] for size in around(0.02)], ["6.366", "12.73"]
     ),
