@@ -19,6 +19,7 @@ from ffr_dyn.scene.joints import H, Joint
 from ffr_dyn.scene.scene import Scene, marker_number, markers
 from ffr_dyn.variants.aligned import BESIDE
 from ffr_dyn.variants.in_line import HAIR, ROUNDING, TOLD, Place, Places, places_of, with_places
+from ffr_dyn.variants.twin_links import with_equal_twins
 from ffr_prep.common.arrays import Array
 
 KINDS = ("revolute", "planar", "cylindrical", "translational", "fixed", "spherical")
@@ -174,9 +175,12 @@ def _put(scene: Scene, plane: Plane, hair: float) -> tuple[Scene, list[str]]:
     for name, held in plane.joints.items():
         scene = with_places(scene, held.joint, wanted[name])
     told = {name: abs(up) for name, (_, up) in off.items() if abs(up) > TOLD}
-    return scene, [
+    notes = [
         f"joint {name!r} is put into the plane of its loop, which it was {up:.2g} m off" for name, up in told.items()
     ]
+    hinges = [joint for joint in scene.joints if joint.name in plane.joints and plane.joints[joint.name].role == HINGE]
+    scene, more = with_equal_twins(scene, hinges, plane.normals, BESIDE * size)
+    return scene, notes + more
 
 
 def _span(plane: Plane, b: int) -> float:
