@@ -41,6 +41,8 @@ def with_equal_twins(
         return scene, []
     own, moves = _own(scene, hinges), At()
     for key, move in _onto_lines(at, lines):
+        if float(np.linalg.norm(move)) > near:
+            return scene, []  # a shaft whose bearings are not in line
         moves[key] = move
         at[key] = at[key] + move
     for keys, move in _to_equal_length(at, lines, own, near):

@@ -280,6 +280,23 @@ def face_group(mesh: Mesh, name: str) -> tuple[Array, ...]:
     return mesh.face_groups[name]
 
 
+def centre_of_geometry(mesh: Mesh, name: str) -> Array | None:
+    """(3,) [m] the centroid of a face group that is made of whole faces of a geometry, as this has it; None of others."""
+    group = mesh.face_groups.get(name, ())
+    nodes = np.unique(np.concatenate([faces.ravel() for faces in group])) if group else np.zeros(0, int)
+    inside = [
+        (face, sum(map(len, facets))) for face, facets in mesh.drawn if all(np.isin(of, nodes).all() for of in facets)
+    ]
+    if (
+        not inside
+        or sum(count for _, count in inside) != sum(map(len, group))
+        or not all(face.exact for face, _ in inside)
+    ):
+        return None
+    areas = np.array([face.area for face, _ in inside])
+    return np.asarray(areas @ np.array([face.centre for face, _ in inside]) / areas.sum())
+
+
 def region_nodes(mesh: Mesh, name: str) -> Array:
     """(m,) nodes, ascending, of a face group or else a node group; InputError lists the groups there are."""
     if name in mesh.face_groups:

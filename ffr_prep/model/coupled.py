@@ -32,8 +32,8 @@ class InterfaceRegion:
     name   : of the interface
     region : face or node group of the mesh; the name of the interface when not given
     kind   : "rigid" (RBE2) or "mean" (RBE3)
-    point  : (3,) position of the six-coordinate node [m]; the area centroid of a face group (the mean of a node
-             group) when not given
+    point  : (3,) position of the six-coordinate node [m]; the area centroid of a face group when not given, as a geometry
+             has it of whole faces, else of the mesh (the mean of a node group)
 
     Raises InputError for another kind.
 

@@ -14,7 +14,7 @@ from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError, require_kind
 from ffr_prep.common.progress import Stages, no_stages
 from ffr_prep.mesh.geometry.skin import region_faces, with_regions
-from ffr_prep.mesh.mesh import Mesh, check_mesh, mesh_hash, misfit_doubts
+from ffr_prep.mesh.mesh import Mesh, centre_of_geometry, check_mesh, mesh_hash, misfit_doubts
 from ffr_prep.model.coupled import CoupledModel, InterfaceRegion
 from ffr_prep.model.invariants import inertia_integrals
 from ffr_prep.model.material import material_doubts
@@ -51,7 +51,8 @@ def from_mesh(
     check_names(interfaces)
     progress("check the mesh")
     check_mesh(mesh)
-    plain, mesh = mesh, with_interfaces(mesh, interfaces)
+    plain, mesh, given = mesh, with_interfaces(mesh, interfaces), interfaces
+    interfaces = [_at_its_centre(mesh, interface) for interface in given]
     progress("assemble stiffness and mass")
     matrices = assemble(mesh, material)
     progress("tie the interfaces")
@@ -85,7 +86,7 @@ def from_mesh(
                 "degrees_of_freedom": coupled.K.shape[0],
             },
             "material": described(material),
-            "interfaces": [_described(plain, interface) for interface in interfaces],
+            "interfaces": [_described(plain, interface) for interface in given],
             "notes": list(mesh.notes),
             "warnings": [*mesh_warnings(mesh), *doubts_of_materials(material)],
         },
@@ -103,6 +104,13 @@ def with_interfaces(mesh: Mesh, interfaces: Sequence[InterfaceRegion]) -> Mesh:
         except InputError as error:
             raise InputError(f"interface {interface.name!r}: {error}") from None
     return mesh
+
+
+def _at_its_centre(mesh: Mesh, interface: InterfaceRegion) -> InterfaceRegion:
+    """An interface at the centroid that a geometry has for its faces: bores of a plate are in its middle plane then, and ends
+    of a shaft on its axis, to the last digits, whatever the mesh."""
+    centre = None if interface.point is not None else centre_of_geometry(mesh, interface.region or interface.name)
+    return interface if centre is None else replace(interface, point=tuple(centre.tolist()))
 
 
 def _described(mesh: Mesh, interface: InterfaceRegion) -> dict[str, Any]:

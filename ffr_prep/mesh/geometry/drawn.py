@@ -26,6 +26,7 @@ def face_of(drawn: DrawnFace, scale: float, points: Array, triangles: Array) -> 
     face = Face(
         drawn.name, drawn.kind if drawn.kind in KINDS else "other", centre, area,
         label=drawn.label, colour=drawn.colour, groups=tuple(drawn.groups), solids=tuple(drawn.solids),
+        exact=len(drawn.exact) > 0,
     )  # fmt: skip
     given = np.asarray(drawn.numbers, float)
     read = _READERS.get(drawn.kind)

@@ -25,6 +25,7 @@ class Face(Brief):
     hollow : whether material lies outside of a curved face, as around a bore; None where that is not known
     label, colour : that the file has for it, or "": the colour as #rrggbb
     groups, solids : that it belongs to
+    exact  : whether centre and area are those of the geometry, and not of its mesh
 
     >>> fp.faces("plate.step").faces[0].area  # [m^2]
     """
@@ -42,6 +43,7 @@ class Face(Brief):
     colour: str = ""
     groups: tuple[str, ...] = ()
     solids: tuple[str, ...] = ()
+    exact: bool = False
 
     @property
     def inner(self) -> bool:

@@ -116,6 +116,14 @@ def test_what_is_recognised_on_a_skin_is_what_was_drawn(size, order, parts):
         assert areas[1] == pytest.approx(areas[0], rel=0.05)
 
 
+def test_interfaces_in_bores_are_on_their_axes_and_half_way_through_whatever_the_mesh(parts):
+    mesh = read_mesh(parts["plate"], size=8.0, order=2)
+    for x in (0.045, -0.045):
+        bore = fp.InterfaceRegion("bore", f"cylinder r=6mm at {1e3 * x:g},25,0")
+        model = fp.from_mesh(mesh, fp.material("steel"), [bore])
+        np.testing.assert_allclose(model.coupled.positions[0], (x, 0.025, 0.0), rtol=0, atol=1e-15)
+
+
 def test_flat_parts_are_taken_out_of_what_is_smooth(tmp_path):
     """A box with rounded edges has no sharp one."""
     path = written(lambda occ: rounded_box(occ), tmp_path / "rounded.step")

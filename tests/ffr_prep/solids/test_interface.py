@@ -7,11 +7,13 @@ import pytest
 from boxes import KINDS, STEEL, box_mesh, moved, rigid_motions, rotation
 
 from ffr_prep.common.errors import InputError
+from ffr_prep.mesh.geometry.face import Face
 from ffr_prep.mesh.mesh import Block, Mesh
 from ffr_prep.mesh.shapes import face_mass
 from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.solids.assembly import assemble
 from ffr_prep.solids.interfaces import couple
+from ffr_prep.solids.model import from_mesh
 
 SIZE = (1.0, 0.3, 0.2)
 
@@ -163,3 +165,24 @@ def test_names_and_kinds_are_checked():
         InterfaceRegion("left", kind="glued")
     with pytest.raises(InputError, match="three finite numbers"):
         InterfaceRegion("left", point=(0.0, np.nan, 0.0))
+
+
+# ---- places of a geometry --------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("exact", "facets", "own"), [(True, 1, False), (True, 2, True), (False, 2, False), (True, 2, False)]
+)
+def test_whole_faces_of_a_geometry_have_their_point_where_it_has_their_centroid(exact, facets, own):
+    """Not so faces of which an interface has a part, those that only their mesh knows, and interfaces with points of their
+    own."""
+    mesh, there, point = box_mesh("hex8", SIZE, (3, 2, 2)), np.array([0.0, 0.151, 0.099]), (0.1, 0.0, 0.0)
+    (left,) = mesh.face_groups["left"]
+    drawn = (Face("surface_1", "plane", there, 0.06, exact=exact), (left,))
+    groups = {**mesh.face_groups, "some": (left[: 2 * facets],)}
+    mesh = replace(mesh, drawn=(drawn,), face_groups=groups)
+    model = from_mesh(mesh, STEEL, [InterfaceRegion("some", point=point if own else None)])
+    taken = (
+        point if own else there if exact and facets == 2 else mesh.points[np.unique(left[: 2 * facets])].mean(axis=0)
+    )
+    np.testing.assert_allclose(model.coupled.positions[0], taken, atol=1e-12)
