@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import re
+import signal
 import subprocess
 import sys
 import tempfile
@@ -35,6 +36,7 @@ CAD_UNITS = {"m": "M", "cm": "CM", "mm": "MM", "in": "INCH"}
 
 _MESHES = (".msh", ".med", ".unv")
 _IGES, _STEP = (".iges", ".igs"), "a STEP file"
+_CRASHES = (signal.SIGABRT, signal.SIGBUS, signal.SIGSEGV)
 _SCRIPT = ".geo"
 _IGES_LINE = rb"[^\n]{72}[SC]"
 _SIGNATURES = {  # how files of data begin
@@ -229,6 +231,8 @@ def _run_gmsh(path: Path, job_file: Path, result: Path) -> None:
     command = [sys.executable, "-P", gmsh_process.__file__, str(job_file), str(result)]
     try:
         done = finished(command, limit())
+        if -done.returncode in _CRASHES:  # one of some dozens of runs on one input ends so
+            done = finished(command, limit())
     except subprocess.TimeoutExpired:
         raise ComputationError(
             f"gmsh did not finish {path} within {limit():g} s: choose a larger element size, simplify the geometry, or give "

@@ -116,6 +116,7 @@ def test_what_is_recognised_on_a_skin_is_what_was_drawn(size, order, parts):
         assert areas[1] == pytest.approx(areas[0], rel=0.05)
 
 
+@pytest.mark.slow
 def test_interfaces_in_bores_are_on_their_axes_and_half_way_through_whatever_the_mesh(parts):
     mesh = read_mesh(parts["plate"], size=8.0, order=2)
     for x in (0.045, -0.045):

@@ -962,6 +962,22 @@ def test_a_gmsh_that_crashes_fails_or_cannot_be_loaded(worker, message, tmp_path
         read_mesh(MESHES / "box.geo")
 
 
+def test_a_gmsh_that_crashes_once_is_run_again(tmp_path, monkeypatch):
+    process = gmsh_source.gmsh_process.__file__
+    crashes = f"""
+import os, pathlib, runpy
+try:
+    pathlib.Path({str(tmp_path / "ran")!r}).touch(exist_ok=False)
+except FileExistsError:
+    runpy.run_path({process!r}, run_name="__main__")
+else:
+    os.kill(os.getpid(), 6)
+"""
+    (tmp_path / "worker.py").write_text(crashes)
+    monkeypatch.setattr(gmsh_source.gmsh_process, "__file__", str(tmp_path / "worker.py"))
+    assert len(read_mesh(MESHES / "box.geo").points) > 0
+
+
 def test_a_gmsh_that_does_not_end_is_stopped(tmp_path, monkeypatch):
     (tmp_path / "worker.py").write_text("import time; time.sleep(60)")
     monkeypatch.setattr(gmsh_source.gmsh_process, "__file__", str(tmp_path / "worker.py"))
