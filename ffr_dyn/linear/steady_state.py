@@ -61,6 +61,7 @@ STALLED = 1e-7  # the same, below which steps that shrink no more are the roundi
 LARGEST = 0.5  # of a step, the same
 NEAR = 0.01  # the same, of steps that lead to no other steady motion
 LEAST_SHARE = 0.01  # of the speed, by which it is followed
+NEARLY = 1e-2  # of the forces, what an unbalance or the weight of a shaft is at most, to be nearly balanced
 BALANCED = (
     1e-13  # of forces relative to all, and of rows relative to their sizes: what is left of a balance by rounding
 )
@@ -471,6 +472,15 @@ def from_rest(machine: Machine, x: Array) -> Steady:
                 f"{share * machine.screws.fastest:.4g} rad/s: a body may be too soft for more, a joint near a dead point, "
                 "or a load larger than what holds it"
             )
+
+
+def nearly_balanced(machine: Machine, x: Array) -> Steady:
+    """At positions (X,) themselves, which all but balance: as near a critical speed, where next to nothing bends a shaft
+    without bound. Raises LeapError where they do not."""
+    found = _at(machine, x)
+    if np.abs(found.Z.T @ found.about.forces).max(initial=0.0) > NEARLY * _size_of_forces(found):
+        raise LeapError
+    return found
 
 
 def _newton(machine: Machine, x: Array) -> Steady | None:

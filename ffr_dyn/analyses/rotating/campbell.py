@@ -17,7 +17,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from ffr_dyn.analyses.registry import OfMoment, option
-from ffr_dyn.analyses.rotating.steady import SPEEDS, TURN, distinct, followed_to, growing, rounding
+from ffr_dyn.analyses.rotating.steady import SPEEDS, TURN, distinct, followed_to, growing, held_near, near_to, rounding
 from ffr_dyn.analyses.settings import MomentSettings
 from ffr_dyn.linear.prestrained import told
 from ffr_dyn.linear.spectrum import Spectrum, followed, spectrum
@@ -28,7 +28,7 @@ from ffr_dyn.results.result import Axis, Quantity, Result
 from ffr_dyn.scene.described import described
 from ffr_dyn.scene.scene import Scene, require_scene
 from ffr_prep.common.arrays import Array
-from ffr_prep.common.errors import InputError
+from ffr_prep.common.errors import ComputationError, InputError
 from ffr_prep.common.progress import no_count
 
 MODES = 10
@@ -126,6 +126,7 @@ def campbell(
     middle = _told_by(spectra)
     whirling = np.nan_to_num(middle.whirl) > ONE_WAY
     everything, called = _slowest(spectra, whirling), middle.names
+    at = _between_speeds(scene, turn, time)
     order, critical, limits = everything[:modes], list[dict[str, Any]](), list[dict[str, Any]]()
     for count, m in enumerate(everything.tolist(), 1):
         shown = count <= order.size
@@ -171,8 +172,30 @@ def _slowest(spectra: Sequence[Spectrum], whirling: Array) -> Array:
 
 
 def _at_speeds(scene: Scene, turn: str, time: float) -> AtSpeed:
+    """Vibrations about the steady motion that that at a row becomes; or, at a critical speed, about its positions."""
+
     def at(speed: float, near: Row | None) -> Spectrum:
-        return spectrum(followed_to(scene, speed, turn, time, near and (near[0], near[1].found))[1])
+        last = near and (near[0], near[1].found)
+        try:
+            return spectrum(followed_to(scene, speed, turn, time, last)[1])
+        except (ComputationError, InputError):  # no balance at all, or none along what has no stiffness
+            if held := last and held_near(scene, speed, turn, time, last):
+                return spectrum(held[1])
+            raise
+
+    return at
+
+
+def _between_speeds(scene: Scene, turn: str, time: float) -> AtSpeed:
+    """The same near a row, which is not left for another motion: what grows without bound here is looked at from there."""
+    known, followed_there = dict[float, Spectrum](), _at_speeds(scene, turn, time)
+
+    def at(speed: float, near: Row | None) -> Spectrum:
+        if speed not in known:  # of two vibrations crossings are often the same
+            last = near and (near[0], near[1].found)
+            found = last and (near_to(scene, speed, turn, time, last) or held_near(scene, speed, turn, time, last))
+            known[speed] = spectrum(found[1]) if found else followed_there(speed, near)
+        return known[speed]
 
     return at
 

@@ -21,14 +21,14 @@ from ffr_dyn.consistency.doubts import checked
 from ffr_dyn.consistency.evaluation import evaluator, joined, record_states
 from ffr_dyn.linear.spectrum import Spectrum, spectrum
 from ffr_dyn.linear.speeds import at_speed, speed_list
-from ffr_dyn.linear.steady_state import LeapError, from_rest, nearby, steady_state
+from ffr_dyn.linear.steady_state import LeapError, from_rest, nearby, nearly_balanced, steady_state
 from ffr_dyn.linear.steady_state import Steady as Found
 from ffr_dyn.results.quantities import selected
 from ffr_dyn.results.result import Quantity, Result
 from ffr_dyn.scene.described import described
 from ffr_dyn.scene.scene import Scene, require_scene
 from ffr_prep.common.arrays import Array
-from ffr_prep.common.errors import ComputationError
+from ffr_prep.common.errors import ComputationError, InputError
 from ffr_prep.common.progress import no_count
 
 CLOSEST = 256  # parts of the way between two speeds, at most, by which a motion is followed
@@ -179,7 +179,7 @@ def followed_to(
     step, least = speed - here, abs(speed - here) / CLOSEST
     while True:
         goal = speed if abs(speed - here) <= abs(step) * (1 + 1e-9) else here + step
-        near = _near(scene, goal, turn, time, found.x)
+        near = near_to(scene, goal, turn, time, (here, found))
         if near is None and abs(step) > least:
             step /= 4
         elif near is None:
@@ -192,11 +192,29 @@ def followed_to(
             here, found, step = goal, near[1], 2 * step
 
 
-def _near(scene: Scene, speed: float, turn: str, time: float, start: Array) -> tuple[Assembled, Found] | None:
-    """The steady state that is near to one (X,) at another speed; None where none is found."""
+def held_near(
+    scene: Scene, speed: float, turn: str, time: float, last: tuple[float, Found]
+) -> tuple[Assembled, Found] | None:
+    """The scene at a speed [rad/s] with the positions that the steady motion has at the `last` one, where these all but
+    balance; None where they do not."""
     try:
-        return _at(scene, speed, turn, time, start, nearby)
-    except (ComputationError, LeapError):
+        assembled, found = _at(scene, speed, turn, time, last[1].x, nearly_balanced)
+    except LeapError:
+        return None
+    note = (
+        f"at {speed:.6g} rad/s no steady motion was found, as at a critical speed, where an unbalance or the weight bends a "
+        f"shaft without bound: its vibrations are those about the positions at {last[0]:.6g} rad/s"
+    )
+    return assembled, replace(found, notes=(note, *found.notes))
+
+
+def near_to(
+    scene: Scene, speed: float, turn: str, time: float, last: tuple[float, Found]
+) -> tuple[Assembled, Found] | None:
+    """The scene at a speed [rad/s] and its steady state that is near to that at the `last` one; None where none is found."""
+    try:
+        return _at(scene, speed, turn, time, last[1].x, nearby)
+    except (ComputationError, InputError, LeapError):
         return None
 
 

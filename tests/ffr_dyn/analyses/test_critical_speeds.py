@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -111,6 +113,30 @@ def test_a_flat_shaft_is_unstable_between_its_critical_speeds(speeds):
     (backward,) = (one["speed"] for one in found["critical"] if one["mode"].endswith("backward"))
     whirl = np.sqrt(np.roots([9, -5 * 2.21e4, 1.21e8]).max())  # (k1 - 5 w^2) (k2 - 5 w^2) = 16 w^4, of 1 kg
     assert backward == pytest.approx(sign * whirl, rel=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("off", "weight", "speeds"),
+    [
+        (1e-5, 0.0, (0, 50, 150)),
+        *(
+            pytest.param(*more, marks=pytest.mark.slow)
+            for more in ((1e-5, 9.81, (0, 50, 150)), (1e-6, 9.81, (80, 100, 120)), (1e-4, 0.0, (80, 100, 120)))
+        ),
+    ],
+)
+def test_an_unbalance_or_the_weight_do_not_hide_a_critical_speed(off, weight, speeds):
+    """Which bend an undamped shaft without bound there: its vibrations are those about the positions beside it."""
+    scene = jeffcott((1e4, 1e4))
+    hub, disc = scene.bodies
+    model = fd.rigid_body(
+        "disc", mass=1.0, inertia=(1e-3, 1e-3, 2e-3), centre_of_mass=(off, 0, 0), points={"c": (0, 0, 0)}
+    )
+    scene = replace(scene, bodies=(hub, replace(disc, model=model)), gravity=(0, -weight, 0))
+    found = fd.campbell(scene, speeds=speeds, modes=2)
+    critical = {one["mode"].rpartition(", ")[2]: one["speed"] for one in found.attributes["critical"]}
+    assert critical == pytest.approx({"forward": 100.0, "backward": 100.0}, rel=1e-5)
+    assert any("no steady motion was found" in note for note in found.attributes["notes"]) == (100 in speeds)
 
 
 @pytest.mark.slow
