@@ -348,7 +348,8 @@ def refine(r, target):
 
 @solve.where(has_dependent_rows)
 def solve_of_dependent_rows(r: Tables, target: Vector) -> int:
-    """Where rows depend on one another: the smallest multipliers, weighted by the diagonal of S, of those that give acc.
+    """Where rows depend on one another: of the multipliers that give acc, those with the smallest sum of lam_k^T S_kk lam_k
+    over the joints k.
 
     What rows contradict one another by, as after a drift within the tolerance, has grown by the inverse of the relaxation in
     the combinations that do nothing. So the system is solved once more for the accelerations of the reactions, which have

@@ -95,9 +95,11 @@ def clear_column(pattern, S, k):
 
 @kernel
 def relax_block(starts, pattern, S, relaxation, k):
-    """Add to the diagonal of block k what lets dependent rows be eliminated."""
-    for row in range(starts[k + 1] - starts[k]):
-        S[pattern.diagonal[k] + (LANES + 1) * row] *= 1.0 + relaxation
+    """Add to block k on the diagonal what lets dependent rows be eliminated. To all of it, to be the same in all axes."""
+    size = starts[k + 1] - starts[k]
+    for row in range(size):
+        for column in range(size):
+            S[pattern.diagonal[k] + LANES * row + column] *= 1.0 + relaxation
 
 
 @inlined
