@@ -419,7 +419,7 @@ def written_by_gmsh(tmp_path_factory):
         gmsh.open(str(MESHES / "box.geo"))
         gmsh.model.mesh.generate(3)
         gmsh.model.mesh.setOrder(1 if kind in ("tet4", "hex8") else 2)
-        for suffix in ("msh", "inp", "bdf", "unv", "med"):
+        for suffix in ("msh", "inp", "bdf", "unv", "med", "mesh"):
             if kind != "hex27" or suffix == "msh":
                 gmsh.write(str(folder / f"{kind}.{suffix}"))
         gmsh.option.setNumber("Mesh.Binary", 1)
@@ -445,6 +445,37 @@ def test_named_surfaces_in_formats_written_by_gmsh(written_by_gmsh, name):
 @pytest.mark.parametrize("kind", ["tet4", "tet10", "hex8", "hex20"])
 def test_bare_bulk_data_written_by_gmsh(written_by_gmsh, kind):
     assert_is_the_box(read_mesh(written_by_gmsh / f"{kind}.bdf"), kind, "property_1", "property_6")
+
+
+@pytest.mark.parametrize("kind", ["tet4", "tet10", "hex8"])
+def test_medit_written_by_gmsh(written_by_gmsh, kind):
+    assert_is_the_box(read_mesh(written_by_gmsh / f"{kind}.mesh"), kind, "ref_1", "ref_6")
+
+
+# One row of a keyword that mmg writes, counts beside keywords, a version that is no number of meshio's table.
+OF_MMG = "MeshVersionFormatted 3\nDimension 3\n# made by mmg\nRequiredTriangles\n1\n1\n"
+
+
+@pytest.mark.parametrize("kind", ["tet10", "hex27"])
+def test_further_nodes_of_medit_are_taken_by_where_they_lie(kind, tmp_path):
+    """The format leaves their order open (L. Marechal, libMeshb)."""
+    box, ours = box_mesh(kind, tuple(SIZE), CELLS), TABLE[kind]
+    shuffled = [*range(ours.corners), *np.random.default_rng(3).permutation(range(ours.corners, ours.size))]
+    rows = [f"{len(box.points)}", *(f"{x!r} {y!r} {z!r} 0" for x, y, z in box.points.tolist())]
+    cells = [" ".join(map(str, [*(of[shuffled] + 1), 5])) for of in box.blocks[0].nodes]
+    keyword = "TetrahedraP2" if kind == "tet10" else "HexahedraQ2"
+    text = [OF_MMG + "Vertices " + "\n".join(rows), f"{keyword} {len(cells)}", *cells, "End", ""]
+    (tmp_path / "box.mesh").write_text("\n".join(text))
+    mesh = read_mesh(tmp_path / "box.mesh")
+    np.testing.assert_array_equal(mesh.blocks[0].nodes, box.blocks[0].nodes)
+    np.testing.assert_array_equal(mesh.points, box.points)
+    np.testing.assert_array_equal(mesh.volume_groups["ref_5"], np.arange(len(cells)))
+
+
+def test_an_ending_that_nothing_reads_is_named(tmp_path):
+    (tmp_path / "box.key").write_text("*KEYWORD\n")
+    with pytest.raises(InputError, match=r"has an ending that no reader of meshes knows: save the mesh as \.msh"):
+        read_mesh(tmp_path / "box.key")
 
 
 def test_units_are_converted_once(written_by_gmsh):

@@ -133,6 +133,12 @@ DECKS = [
     of("mesh.frd", (FRD_HEAD, FRD_HEAD[:-1] + "2")),
     of("mesh.frd", (" -1         1    3", " -1         1    2")),
     of("mesh.vtu", ("VTKFile", "VTK")),
+    of("mesh.mesh", ("MeshVersionFormatted", "Formatted")),
+    of("mesh.mesh", ("Dimension 3", "Dimension 2"), ("Vertices", "Vertex")),
+    of("mesh.mesh", ("Dimension 3", "Dimension three")),
+    of("mesh.mesh", ("Dimension 3", "Dimension 3000000000000000")),
+    of("mesh.mesh", ("\nVertices\n", "\nVertices\n1")),
+    of("mesh.mesh", ("\nTetrahedra\n6\n1", "\nTetrahedra\n6\n99")),
 ]  # fmt: skip
 NINE = (
     "*ELASTIC\n2.1e11, 0.3",
@@ -251,11 +257,11 @@ SOLIDS = replace(
 )
 
 
-def medit(dimension: int = 3, last: int = 4) -> object:
+def su2(dimension: int = 3, last: int = 3) -> object:
     """A tetrahedron in a file of another program that meshio reads."""
-    corners = "\n".join(" ".join([*place[:dimension], "1"]) for place in ("000", "100", "010", "001"))
-    head = f"MeshVersionFormatted 2\nDimension\n{dimension}\nVertices\n4\n{corners}\n"
-    return with_files(lambda: read_mesh("a.mesh"), {"a.mesh": (("", f"{head}Tetrahedra\n1\n1 2 3 {last} 1\nEnd\n"),)})
+    corners = "\n".join(" ".join(place[:dimension]) for place in ("000", "100", "010", "001"))
+    text = f"NDIME= {dimension}\nNELEM= 1\n10 0 1 2 {last}\nNPOIN= 4\n{corners}\nNMARK= 0\n"
+    return with_files(lambda: read_mesh("a.su2"), {"a.su2": (("", text),)})
 
 
 def stepped(query: str) -> object:
@@ -275,8 +281,8 @@ FAILURES = [
     Case(p(_check_geometry, STEP, "m", {}), p(_check_geometry, STEP, None, {})),
     Case(p(check_mesh, SOLIDS), p(check_mesh, PLAIN)),
     of("block.inp", ("1, 0.0", "1, 1e40")),
-    Case(p(medit, 2), medit),
-    Case(p(medit, last=9), medit),
+    Case(p(su2, 2), su2),
+    Case(p(su2, last=9), su2),
     Case(p(stepped, "plane normal=0,1,0"), p(stepped, "all plane normal=0,1,0")),
     Case(p(face_group, PLAIN, "lid"), p(face_group, PLAIN, "top")),
 ]
