@@ -687,7 +687,8 @@ def test_abaqus_includes(deck, tmp_path):
         ("9, 0., 0., 2.", "8, 0., 0., 2.", "node 8 is defined twice"),
         ("20, 5, 6, 7, 8,", "10, 5, 6, 7, 8,", "element 10 is defined twice"),
         ("C3D8I", "C3D15", "volume elements of kind 'C3D15'"),
-        ("*Mass, elset=Both", "*Instance, name=a, part=p\n1., 0., 0.", "assembly"),
+        ("*Mass, elset=Both", "*Instance, name=a, part=p\n*End Instance\n*Instance, name=b, part=p", "assembly"),
+        ("*Mass, elset=Both", "*Instance, name=a, part=p\n1., 0., 0.\n0, 0, 1, 0, 0, 1, 90.", "two points are one"),
         ("*Mass, elset=Both", "*Include, input=nowhere.inp", "nowhere.inp does not exist"),
         ("6, 1., 0., 1.", "6, 1., zero, 1.", "cannot read .*cube.inp as an Abaqus input file"),
     ],
@@ -743,6 +744,44 @@ def test_abaqus_reference_points_of_an_assembly_are_no_nodes_of_its_part(deck):
     assert mesh.node_groups.keys() - plain.node_groups.keys() == {"Four"}
     assert mesh.volume_groups.keys() == plain.volume_groups.keys()
     assert mesh.notes[1].startswith("2 nodes of the assembly left out: reference points are those of interfaces")
+
+
+def test_the_place_of_the_one_instance_is_that_of_the_mesh(deck):
+    """Abaqus Keywords Reference Guide, *INSTANCE: shifted first, then turned about a line through two points [deg]."""
+    placed = "*Instance, name=cube-1, part=cube\n0.5, , 2.\n0.5, 0., 0., 0.5, 0., 4., 90.\n*End Instance\n"
+    plain, mesh = read_mesh(deck()), read_mesh(deck(DECK + placed))
+    x, y, z = plain.points.T
+    np.testing.assert_allclose(mesh.points, np.stack([0.5 - y, x, z + 2], axis=1), atol=1e-15)
+    assert mesh.node_groups.keys() == plain.node_groups.keys()
+
+
+def test_abaqus_keywords_behind_blanks_and_parameters_of_the_next_line(deck):
+    """Abaqus Keywords Reference Guide: the first character of a keyword line that is not blank is the star."""
+    mesh = read_mesh(deck(DECK.replace("*Element", "  *Element") + "*Nset, nset=Some,\n  generate\n1, 3\n"))
+    assert mesh.volume_groups.keys() == read_mesh(deck()).volume_groups.keys()
+    np.testing.assert_array_equal(mesh.node_groups["Some"], range(3))
+
+
+def test_a_set_with_a_point_in_its_name_is_no_number_of_an_instance(deck):
+    """It was element 10 of an instance "near": the other end of the cubes."""
+    sets = "*Elset, elset=near.10\n20\n*Surface, name=There\nnear.10, S2\n"
+    mesh = read_mesh(deck(DECK + sets))
+    np.testing.assert_array_equal(mesh.points[region_nodes(mesh, "There")][:, 2], 2.0)
+
+
+def test_abaqus_order_of_hexahedra_with_27_nodes(deck):
+    """Abaqus, Three-dimensional solid element library: node 21 in the middle, 22 to 27 on the faces S1 to S6."""
+    box, faces = box_mesh("hex27", tuple(SIZE), (1, 1, 1)), (1, 2, 3, 4, 5, 6)
+    corners, middle = box.points[box.blocks[0].nodes[0][:8]], box.blocks[0].nodes[0][20:]
+    sides = [(0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0)]
+    places = [corners.mean(axis=0), *(corners[list(sides[k - 1])].mean(axis=0) for k in faces)]
+    order = [int(np.linalg.norm(box.points[middle] - at, axis=1).argmin()) for at in places]
+    element = [1, *(box.blocks[0].nodes[0][:20] + 1), *(middle[order] + 1)]
+    nodes = [f"{k}, {x!r}, {y!r}, {z!r}" for k, (x, y, z) in enumerate(box.points.tolist(), 1)]
+    text = "\n".join(["*NODE", *nodes, "*ELEMENT, TYPE=C3D27", ", ".join(map(str, element)), ""])
+    mesh = read_mesh(deck(text))
+    check_mesh(mesh)
+    assert_nodes_in_order(mesh)
 
 
 def test_abaqus_node_sets_of_element_sets(deck):

@@ -108,7 +108,8 @@ DECKS = [
     of("block.inp", ("C3D8, ELSET=ALL\n1, 1,", "C3D8, ELSET=ALL\n1, 99,")),
     of("block.inp", ("C3D8, ELSET=ALL\n1, 1,", "C3D8, ELSET=ALL\n2, 1,")),
     of("block.inp", ("*NODE", "*INCLUDE, INPUT=block.inp\n*NODE")),
-    of("block.inp", ("*NODE", "*INSTANCE, NAME=a, PART=p\n1., 0., 0.\n*NODE")),
+    of("block.inp", ("*NODE", "*INSTANCE, NAME=a, PART=p\n*INSTANCE, NAME=b, PART=p\n*NODE")),
+    of("block.inp", ("*NODE", "*INSTANCE, NAME=a, PART=p\n1., 0., 0.\n0, 0, 0, 0, 0, 0, 90.\n*NODE")),
     of("block.inp", ("TYPE=C3D8", "TYPE=C3D6")),
     of("block.inp", ("TYPE=C3D8", "TYPE=B31")),
     rewritten(
@@ -144,11 +145,13 @@ NINE = (
     "*ELASTIC\n2.1e11, 0.3",
     "*ELASTIC, TYPE=ENGINEERING CONSTANTS\n1.2e10, 8e8, 5e8, .4, .3, .3, 7e8, 7e8\n8e7",
 )
+TURNED = "*INSTANCE, NAME=a, PART=p\n0., 0., 0.\n0, 0, 0, 0, 0, 1, 90.\n"
 MATERIALS = [
     edited(materials, "block.inp", ("MATERIAL=STEEL", "MATERIAL=BRASS")),
     edited(materials, "block.inp", ("2.1e11", "2.1e5")),
     edited(materials, "block.inp", ("*DENSITY\n7850.\n", "")),
     edited(materials, "block.inp", ("SECTION, ELSET", "SECTION, ORIENTATION=o, ELSET"), NINE),
+    edited(materials, "block.inp", ("*NODE", f"{TURNED}*NODE"), NINE),
     edited(materials, "block.inp", ("*ELASTIC", "*ELASTIC, TYPE=LAMINA")),
     edited(materials, "block.inp", ("2.1e11", "stiff")),
     edited(materials, "block.inp", ("*DENSITY\n7850.\n", "*DENSITY\n7850.\n*DENSITY\n7800.\n")),
