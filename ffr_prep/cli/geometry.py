@@ -30,7 +30,7 @@ Regions: wherever a surface is named, it may be found by what it is instead.
 UNIT = click.option(
     "--unit",
     type=click.Choice(["m", "cm", "mm", "in"]),
-    help="Unit of the numbers in the file; default: what a STEP file declares, mm for IGES, m for others.",
+    help="Unit of the numbers in the file; default: what a STEP or .unv file declares, mm for IGES, m for others.",
 )
 SOLIDS = click.option(
     "--solid", "solids", multiple=True, metavar="NAME", help="Of a CAD file with several solids keep this one; repeat."

@@ -478,6 +478,29 @@ def test_an_ending_that_nothing_reads_is_named(tmp_path):
         read_mesh(tmp_path / "box.key")
 
 
+UNITS = """    -1
+   164
+         5mm (milli-newton)               2
+  {}  1.00000000000000000D+03  1.00000000000000000D+00
+  2.73149999999999977D+02
+    -1
+"""
+
+
+@pytest.mark.parametrize(
+    ("factor", "unit"), [("1.00000000000000000D+03", "mm"), ("3.93700787401574797D+01", "in"), ("1.0D+00", "m")]
+)
+def test_the_unit_that_a_universal_file_declares(written_by_gmsh, tmp_path, factor, unit):
+    """I-deas Test Data Journal, dataset 164: lengths are divided by the first factor to be metres."""
+    plain = written_by_gmsh / "tet10.unv"
+    (tmp_path / "box.unv").write_text(UNITS.format(factor) + plain.read_text())
+    mesh = read_mesh(tmp_path / "box.unv")
+    np.testing.assert_array_equal(mesh.points, read_mesh(plain, unit=unit).points)
+    assert mesh.unit == unit
+    told = [note for note in read_mesh(tmp_path / "box.unv", unit="cm").notes if "which was given" in note]
+    assert len(told) == (unit != "m")  # some programs write metres whatever they have
+
+
 def test_units_are_converted_once(written_by_gmsh):
     metres = read_mesh(written_by_gmsh / "tet4.msh")
     for unit, factor in {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254}.items():
