@@ -118,9 +118,9 @@ def read_mesh(
 ) -> Mesh:
     """A mesh from a file, in metres; geometry (.geo, .step, .iges, .brep) is meshed by gmsh first.
 
-    unit     : of the numbers in the file, "m", "cm", "mm" or "in"; without it the unit that a STEP file declares,
-               or a universal file (.unv), millimetres for IGES, which is converted to them, and metres for every other file. Another unit than a STEP
-               or IGES file declares is refused
+    unit     : of the numbers in the file, "m", "cm", "mm" or "in"; without it the unit that a STEP file declares, or a
+               universal file (.unv), millimetres for IGES, which is converted to them, and metres for every other file.
+               Another unit than a STEP or IGES file declares is refused
     size     : largest element edge when geometry is meshed, in the unit of the file [m, cm, mm or in]
     numbers  : parameters of a .geo script to change, by name, lengths in the unit of the script [m, mm ...]
     order    : 1 or 2, of the elements when geometry is meshed, 2 when not given; second-order elements follow curved
