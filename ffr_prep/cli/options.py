@@ -121,11 +121,12 @@ def material_of(texts: Sequence[str]) -> Solid | Mapping[str, Solid]:
 
 
 def interface_of(text: str) -> InterfaceRegion:
-    """NAME[=REGION][:rigid|mean][@x,y,z], the point at any place behind the name."""
+    """NAME[=REGION][:rigid|mean][@x,y,z], the kind and the point at any place behind the name."""
     from ffr_prep.mesh.geometry.region_words import is_query
     from ffr_prep.model.coupled import InterfaceRegion
 
     ordered = re.sub(r"(@[-+.\w]+(?:,[-+.\w]+)*)([=:].+)$", r"\2\1", text)
+    ordered = re.sub(r"^([^=:@]+):(\w+)=([^@]+)", r"\1=\3:\2", ordered)
     parts = re.fullmatch(r"([^=:@]+)(?:=(.+?))?(?::(\w+))?(?:@([^@]+))?", ordered)
     if parts is None:
         raise InputError(f"--interface {text}: write NAME, NAME:mean, NAME=SURFACE or NAME@x,y,z (see --help)")
