@@ -110,8 +110,8 @@ def test_stress_beside_a_cut_is_told_of_solids_alone():
 
 @pytest.mark.parametrize(("normal", "stepped"), [((1.0, 0.0, 0.0), False), ((1.0, 2.0, 0.0), True)])
 def test_stress_at_a_cut_without_a_plane_of_faces_is_told_to_be_none(normal, stepped):
-    """Under one pascal of tension the elements that a stepped cut holds as a whole have none; a plane one leaves half. The plane
-    that is asked for goes through 0.12 m of the length."""
+    """Under one pascal of tension the elements that a stepped cut holds as a whole have none; a plane one leaves half. The
+    plane that is asked for goes through 0.12 m of the length."""
     mesh = box_mesh("tet10", (0.24, 0.06, 0.04), (10, 3, 1))
     model = from_mesh(mesh, STEEL, [InterfaceRegion("left"), InterfaceRegion("right")])
     request = Request(name="bar", reference=FixedTo("left"), reduction=CraigBampton(0), stress=True, linear=True)
