@@ -55,6 +55,7 @@ OPTIONS = [
     reduces("--accuracy 10;20;3", "--modes 2"),
     reduces("--accuracy 10,20", "--frequency 2000"),
     reduces("--method guyan --modes 2", "--method guyan --method craig-bampton --modes 2"),
+    reduces("--moments 1", "--method krylov --moments 1"),
     words("reduce block.inp --interface LEFT -o scene.toml", REDUCE),
     words(
         "reduce part.geo --interface surface_1 -o new.ffr",
