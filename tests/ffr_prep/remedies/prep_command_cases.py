@@ -36,6 +36,7 @@ OPTIONS = [
     words("modes body.ffr --modes x -o out", "modes body.ffr --modes 1-1 -o out"),
     words("modes body.ffr --modes 9 -o out", "info body.ffr"),
     words("rigid part.geo -o new.ffr", "rigid part.geo --density 7850 -o new.ffr"),
+    words("rigid part.geo --material ALL=steel -o new.ffr", "rigid part.geo --material steel -o new.ffr"),
     reduces("--set a --mesher-timeout 9", "--mesher-timeout 9"),
     words("mesh part.geo --set w", "mesh part.geo --size 1 --order 1 --set w=0.2"),
     words("mesh part.geo --set w=wide", "mesh part.geo --size 1 --order 1 --set w=2e-1"),
