@@ -15,6 +15,7 @@ from ffr_dyn.consistency.assemble import Assembled
 from ffr_dyn.consistency.evaluation import evaluate, evaluator, free_motions, total_mass_matrix
 from ffr_dyn.equations.inertia import damping_matrix
 from ffr_dyn.results.result import Result
+from ffr_dyn.scene.scene import Body
 from ffr_prep.common.arrays import Array
 
 UNRESOLVED = 2.0  # h omega
@@ -71,21 +72,27 @@ def damped_less(of: Vibrations) -> list[str]:
     for b, body in enumerate(of.assembled.system.scene.bodies):
         if body.frame is None or body.part_of or not body.damping.any():
             continue
-        own, rates = of.motions[place.q_dot(b)], np.sqrt(body.model.omega2)
-        strained = (rates**2) @ own**2
-        leads = np.flatnonzero(strained > 0.5 * of.omega**2)
-        if not leads.size:
-            continue
-        k, asked = leads[0], float(body.damping[np.argmin(rates)])
-        ratio = float((body.damping * rates) @ own[:, k] ** 2 * of.omega[k] / strained[k])
-        if ratio < _LESS * asked:
+        asked, found = float(body.damping[np.argmin(body.model.omega2)]), _slowest(of, body, place.q_dot(b))
+        if found and found[1] < _LESS * asked:
             told.append(
                 f"body {body.name!r}: its damping ratio {asked:.3g} belongs to the modes of the free body; its slowest "
-                f"vibration here, {of.omega[k] / (2 * np.pi):.4g} Hz, has {ratio:.2g}. For {asked:.3g} as its reference "
+                f"vibration here, {found[0] / (2 * np.pi):.4g} Hz, has {found[1]:.2g}. For {asked:.3g} as its reference "
                 f"conditions hold it, give damping_bands = [[1000, {asked:.3g}]] in its place, or "
                 f"fp.damped(body, ratios=[{asked:.3g}])"
             )
     return told
+
+
+def _slowest(of: Vibrations, body: Body, rows: slice) -> tuple[float, float] | None:
+    """[rad/s] and damping ratio, by the ratios of the scene, of the slowest vibration that strains a body most; None where
+    others lead in all."""
+    own, rates = of.motions[rows], np.sqrt(body.model.omega2)
+    strained = (rates**2) @ own**2
+    leads = np.flatnonzero(strained > 0.5 * of.omega**2)
+    if not leads.size:
+        return None
+    k = leads[0]
+    return float(of.omega[k]), float((body.damping * rates) @ own[:, k] ** 2 * of.omega[k] / strained[k])
 
 
 def leading(of: Vibrations, run: Result, twin: Result) -> float:

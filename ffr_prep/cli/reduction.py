@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ffr_prep.cli.options import bundle
-from ffr_prep.cli.settings import numbers
+from ffr_prep.cli.settings import numbers, written
 from ffr_prep.common.command import OUTPUT_FILE
 from ffr_prep.common.errors import InputError
 from ffr_prep.reduction.registry import MODES, REDUCTIONS, SELECTING, check_taken, method_of, takes
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from ffr_prep.reduction.basis import Reduction
     from ffr_prep.reduction.selection import Band
 
-_WRITTEN = click.core.ParameterSource.COMMANDLINE
 NOTES = """\b
 Reductions: --method may be repeated, and the space of all of them is taken.
 {reduction}
@@ -102,9 +101,7 @@ def damping_of(options: Mapping[str, Any]) -> Damping:
 def reduction_of(options: Mapping[str, Any]) -> Reduction:
     """The reduction that the options describe; InputError for options that do not fit each other."""
     methods = list(dict.fromkeys(options["methods"]))
-    context = click.get_current_context(silent=True)
-    written = [s.name for s in REDUCTIONS.settings() if context and context.get_parameter_source(s.name) == _WRITTEN]
-    check_taken([*(name for name in SELECTING if options[name] is not None), *written], methods)
+    check_taken([*(name for name in SELECTING if options[name] is not None), *written(REDUCTIONS)], methods)
     return reduction_made(
         [
             {"method": method} | {name: value for name, value in options.items() if takes(method_of(method), name)}

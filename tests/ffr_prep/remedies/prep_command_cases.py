@@ -224,6 +224,7 @@ FILES = [
     ),
     words("import block.inp -o new.ffr", "import legacy.fem -o new.ffr"),
     words("export body.ffr -o new.xyz", "export body.ffr -o new.sid"),
+    words("export body.ffr -o new.sid --kind full", "export body.ffr -o new.fem --kind full"),
     words("info body.ffr --terms I10", "info body.ffr --terms I1"),
     reduces("--stiffening", "--linear"),
     words("reduce block.inp --linear --interface LEFT -o -", REDUCE),
