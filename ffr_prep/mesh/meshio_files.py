@@ -46,7 +46,9 @@ def _read(path: Path) -> meshio.Mesh:
     if path.suffix.lower() == ".mesh":
         return from_medit(path)
     if not path.name.lower().endswith(tuple(meshio.extension_to_filetypes)):
-        raise InputError(not_of_its_ending(path, "a mesh", f"has an ending that no reader of meshes knows: {_SAVE}"))
+        raise InputError(
+            not_of_its_ending(path, "a mesh", f"has an ending that no reader knows: {_SAVE}, or a geometry as .step")
+        )
     with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()) as said:
         try:
             return meshio.read(path)

@@ -474,8 +474,14 @@ def test_further_nodes_of_medit_are_taken_by_where_they_lie(kind, tmp_path):
 
 def test_an_ending_that_nothing_reads_is_named(tmp_path):
     (tmp_path / "box.key").write_text("*KEYWORD\n")
-    with pytest.raises(InputError, match=r"has an ending that no reader of meshes knows: save the mesh as \.msh"):
+    with pytest.raises(InputError, match=r"has an ending that no reader knows: save the mesh as \.msh"):
         read_mesh(tmp_path / "box.key")
+
+
+def test_a_dat_file_of_ansys_is_no_mesh_without_solids(tmp_path):
+    (tmp_path / "ds.dat").write_text("/batch\n/prep7\nnblock,3\n(1i9,3e20.9e3)\n        1     0.000000000E+000\n-1\n")
+    with pytest.raises(InputError, match=r"ds\.dat: it has no GRID: is it Nastran bulk data\?"):
+        read_mesh(tmp_path / "ds.dat")
 
 
 UNITS = """    -1

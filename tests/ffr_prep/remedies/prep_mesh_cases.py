@@ -119,6 +119,7 @@ DECKS = [
         (),
     ),
     of("fields.bdf", ("GRID,4,", "GRID,x,")),
+    rewritten(read_mesh, "fields.bdf", (("", "/batch\n"),), ()),
     of("fields.bdf", ("GRID,4,", "=,4,")),
     of("fields.bdf", ("1.+0\n", "1.+0,,,,9\n")),
     of("fields.bdf", ("BEGIN BULK\n", "BEGIN BULK\nGRID,90,,0.,0.,5.,,,,+A\n+B,7\n")),
