@@ -513,6 +513,22 @@ def test_units_are_converted_once(written_by_gmsh):
         np.testing.assert_array_equal(read_mesh(written_by_gmsh / "tet4.msh", unit=unit).points, factor * metres.points)
 
 
+@pytest.mark.parametrize("first", ["tetra", "tetra10"])
+def test_elements_of_both_orders_in_one_volume_are_refused(tmp_path, first):
+    """Gmsh gives the nodes of all as those of the first: the corners alone, or zeros for those that there are not."""
+    box = box_mesh("tet10", tuple(SIZE), CELLS)
+    half = len(box.blocks[0].nodes) // 2
+    cells = {"tetra": box.blocks[0].nodes[:half, :4], "tetra10": box.blocks[0].nodes[half:]}
+    mixed = [(first, cells.pop(first)), *cells.items()]
+    tagged = [np.ones(len(nodes), int) for _, nodes in mixed]
+    given = {"gmsh:physical": tagged, "gmsh:geometrical": tagged}
+    meshio.Mesh(box.points, mixed, cell_data=given).write(tmp_path / "box.msh", file_format="gmsh22")
+    with pytest.raises(
+        InputError, match=r"box\.msh: a volume has elements of first and of second order beside each other"
+    ):
+        read_mesh(tmp_path / "box.msh")
+
+
 def test_wedges_are_refused(tmp_path):
     points = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [0, 1, 1]]
     meshio.Mesh(np.array(points, float), [("wedge", [[0, 1, 2, 3, 4, 5]])]).write(tmp_path / "w.vtu")
