@@ -360,6 +360,7 @@ def _write_meshes(folder: Path, mesh, meshio) -> None:
     plain = meshio.Mesh(mesh.points, [("tetra10", block.nodes)])
     corners = meshio.Mesh(mesh.points, [("tetra", block.nodes[:, :4])])
     plain.write(folder / "mesh.vtu")
+    corners.write(folder / "mesh.mesh")
     corners.write(folder / "mesh.bdf")
     corners.write(folder / "mesh.vtk")
     (folder / "fields.bdf").write_text(BULK)
@@ -453,7 +454,7 @@ def formats() -> dict[str, tuple[tuple[str, ...], Callable[[Path], object]]]:
         "Abaqus mesh": (("mesh.inp",), with_materials),
         "Nastran": (("mesh.bdf", "fields.bdf"), with_materials),
         "CalculiX": (("mesh.frd",), lambda path: check_mesh(read_mesh(path))),
-        "meshio": (("mesh.vtu", "mesh.vtk"), lambda path: check_mesh(read_mesh(path))),
+        "meshio": (("mesh.vtu", "mesh.vtk", "mesh.mesh"), lambda path: check_mesh(read_mesh(path))),
         "gmsh": (("mesh.msh", "binary.msh"), lambda path: check_mesh(read_mesh(path))),
     }  # fmt: skip
 

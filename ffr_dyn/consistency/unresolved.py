@@ -1,4 +1,4 @@
-"""Vibrations that a step does not resolve: how long they last, which they are.
+"""Vibrations of a scene: those that a step does not resolve, how long they last, and by which ratio bodies damp them.
 
 By the modes of the scene as it stands at its start, its bodies coupled by the joints and driven as they are: with Z the free
 motions, Z^T M Z = 1, those of Z^T Omega^2 Z. What else holds the scene, such as springs and gravity, is slow beside them.
@@ -15,9 +15,11 @@ from ffr_dyn.consistency.assemble import Assembled
 from ffr_dyn.consistency.evaluation import evaluate, evaluator, free_motions, total_mass_matrix
 from ffr_dyn.equations.inertia import damping_matrix
 from ffr_dyn.results.result import Result
+from ffr_dyn.scene.scene import Body
 from ffr_prep.common.arrays import Array
 
 UNRESOLVED = 2.0  # h omega
+_LESS = 0.25  # of a damping ratio that a scene gives, below which the one that comes of it is told; between hinges it is 0.43
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,6 +60,39 @@ def lasting(of: Vibrations, step: float) -> float:
     if not beyond.any():
         return 1.0
     return float(np.exp(-of.ratio[beyond].min() * of.omega[beyond].min() * step))
+
+
+def damped_less(of: Vibrations) -> list[str]:
+    """Notes on bodies whose ratios, those of the modes of the free body, damp their slowest vibration here by far less.
+
+    A vibration that joints hold is slow beside the free modes that it is made of, which lose sum 2 zeta omega_i q_i'^2 of
+    power: of unit mass it has the ratio zeta sum omega_i q_i^2 / omega, 0.07 zeta of a clamped beam.
+    """
+    place, told = of.assembled.system.layout, []
+    for b, body in enumerate(of.assembled.system.scene.bodies):
+        if body.frame is None or body.part_of or not body.damping.any():
+            continue
+        asked, found = float(body.damping[np.argmin(body.model.omega2)]), _slowest(of, body, place.q_dot(b))
+        if found and found[1] < _LESS * asked:
+            told.append(
+                f"body {body.name!r}: its damping ratio {asked:.3g} belongs to the modes of the free body; its slowest "
+                f"vibration here, {found[0] / (2 * np.pi):.4g} Hz, has {found[1]:.2g}. For {asked:.3g} as its reference "
+                f"conditions hold it, give damping_bands = [[1000, {asked:.3g}]] in its place, or "
+                f"fp.damped(body, ratios=[{asked:.3g}])"
+            )
+    return told
+
+
+def _slowest(of: Vibrations, body: Body, rows: slice) -> tuple[float, float] | None:
+    """[rad/s] and damping ratio, by the ratios of the scene, of the slowest vibration that strains a body most; None where
+    others lead in all."""
+    own, rates = of.motions[rows], np.sqrt(body.model.omega2)
+    strained = (rates**2) @ own**2
+    leads = np.flatnonzero(strained > 0.5 * of.omega**2)
+    if not leads.size:
+        return None
+    k = leads[0]
+    return float(of.omega[k]), float((body.damping * rates) @ own[:, k] ** 2 * of.omega[k] / strained[k])
 
 
 def leading(of: Vibrations, run: Result, twin: Result) -> float:

@@ -19,12 +19,17 @@ from scipy.linalg import eigh, null_space, qr
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
-from ffr_prep.body import FlexibleBody
+from ffr_prep.body import KEPT, FlexibleBody, cut_twins, paired
 from ffr_prep.common.arrays import Array
 
 _APART = 1e-7  # an interface coordinate below this share of the largest of its mode is none
+_STILL = (
+    1e-9  # interface coordinates below this share of those of a rigid motion are rounding, as where a body is clamped
+)
 _SOFTEST = 1e-12  # share of the largest eigenvalue below which a mode counts as free
 _INDEPENDENT = 1e-6  # of static shapes: what is left of a column after the others are taken out of it
+
+_Candidate = tuple[int, float, int, Array]  # 0 static or 1 not, rank among these, family, shape (n,)
 
 
 def statically_complete(body: FlexibleBody, count: int, interfaces: Iterable[str] | None = None) -> Array:
@@ -33,21 +38,41 @@ def statically_complete(body: FlexibleBody, count: int, interfaces: Iterable[str
     Static shapes of the named interfaces (all by default) come first; with fewer than these, the stiffest are missing.
     `count` is from 1 to n.
     """
-    shapes = _interface_shapes(body, None if interfaces is None else set(interfaces))
-    candidates = [one for family in _families(shapes) for one in _candidates(shapes, body.omega2, family)]
-    candidates.sort(key=lambda one: one[:2])
     families: dict[int, list[Array]] = {}
-    for _, _, family, shape in candidates[:count]:
+    for _, _, family, shape in _ranked(body, interfaces)[:count]:
         families.setdefault(family, []).append(shape)
     V = np.concatenate([_diagonal(np.array(shapes).T, body.omega2) for shapes in families.values()], axis=1)
     return V[:, np.argsort(np.einsum("ij,i,ij->j", V, body.omega2, V), kind="stable")]
 
 
+def cut_of_shapes(body: FlexibleBody, count: int, interfaces: Iterable[str] | None = None) -> tuple[str, ...]:
+    """Says so when `statically_complete` leaves out one of two shapes that a symmetric body has in two planes: static ones of
+    equal compliance, or modes of equal frequency with the interfaces held."""
+    ranked = _ranked(body, interfaces)
+    static = np.array([1 / rank**2 for kind, rank, *_ in ranked if kind == 0])
+    held = np.array([rank for kind, rank, *_ in ranked if kind == 1])
+    apart = np.zeros(1 if static.size and held.size else 0, bool)
+    twins = np.concatenate([paired(static), apart, paired(held)])
+    equal = "compliance at the interfaces"
+    if count > static.size:
+        equal = f"frequency ({np.sqrt(held[count - static.size - 1]) / (2 * np.pi):.4g} Hz)"
+    return cut_twins(twins, count, KEPT, equal)
+
+
+def _ranked(body: FlexibleBody, interfaces: Iterable[str] | None) -> list[_Candidate]:
+    """All shapes that there are to choose from, in the order in which they are taken."""
+    shapes = _interface_shapes(body, None if interfaces is None else set(interfaces))
+    candidates = [one for family in _families(shapes) for one in _candidates(shapes, body.omega2, family)]
+    return sorted(candidates, key=lambda one: one[:2])
+
+
 def _interface_shapes(body: FlexibleBody, names: set[str] | None) -> Array:
-    """(6 I, n) motion of the interfaces per elastic coordinate; rotations times the body's radius of gyration."""
+    """(6 I, n) motion of the interfaces per elastic coordinate, none where it is rounding; rotations times the body's radius
+    of gyration."""
     length = np.sqrt(np.trace(body.rr_dm) / body.mass)
     rows = [part for i in body.interfaces if names is None or i.name in names for part in (i.phi_t, length * i.phi_r)]
-    return np.concatenate(rows) if rows else np.zeros((0, body.n))
+    shapes = np.concatenate(rows) if rows else np.zeros((0, body.n))
+    return np.where(np.abs(shapes) > _STILL / np.sqrt(body.mass), shapes, 0.0)  # of unit modal mass, as a rigid motion
 
 
 def _families(shapes: Array) -> list[Array]:
@@ -60,8 +85,8 @@ def _families(shapes: Array) -> list[Array]:
     return [np.flatnonzero(label == k) for k in np.unique(label)]
 
 
-def _candidates(shapes: Array, omega2: Array, family: Array) -> list[tuple[int, float, int, Array]]:
-    """(0 static or 1 not, rank among these, family, shape (n,)) of every shape that a family offers."""
+def _candidates(shapes: Array, omega2: Array, family: Array) -> list[_Candidate]:
+    """Every shape that a family offers."""
     rows, stiffness = shapes[:, family], np.maximum(omega2[family], _SOFTEST * omega2.max())
     compliant = rows / np.sqrt(stiffness)
     _, R, order = qr(compliant.T, mode="economic", pivoting=True)

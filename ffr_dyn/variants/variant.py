@@ -27,8 +27,8 @@ import numpy as np
 from ffr_dyn.scene.force_kinds import in_bases, modal_fields
 from ffr_dyn.scene.parts import owner
 from ffr_dyn.scene.scene import INERTIA_TERMS, Body, Scene, used_interfaces
-from ffr_dyn.variants.condensation import statically_complete
-from ffr_prep.body import FlexibleBody, of_fewer_shapes, recombined, truncated
+from ffr_dyn.variants.condensation import cut_of_shapes, statically_complete
+from ffr_prep.body import FlexibleBody, of_fewer_shapes, recombined, truncated, with_cut
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 
@@ -85,7 +85,8 @@ def with_basis(model: FlexibleBody, V: Array) -> FlexibleBody:
 def with_modes(body: Body, keep: Modes, interfaces: Iterable[str] | None = None) -> Body:
     """The body with fewer elastic coordinates, chosen as in `basis_of`; it starts in the nearest state (least mass).
 
-    Damping ratios become those of the damping matrix in the new coordinates, without what couples these.
+    Damping ratios become those of the damping matrix in the new coordinates, without what couples these. A number that
+    leaves out the twin of a shape that it keeps, as of a round bar in two planes, is told by the runs of a scene in space.
 
     Raises InputError for a scene, of which `vary` makes one with fewer modes, and for a body in parts.
 
@@ -108,7 +109,9 @@ def with_modes(body: Body, keep: Modes, interfaces: Iterable[str] | None = None)
     if keep >= body.model.n:
         return body
     V = basis_of(body.model, keep, interfaces)
-    model, frame = with_basis(body.model, V), body.frame and body.frame.combined(V)
+    told = cut_of_shapes(body.model, int(keep), interfaces)
+    model = with_basis(body.model, V)
+    model, frame = replace(model, provenance=with_cut(model.provenance, told)), body.frame and body.frame.combined(V)
     damping = _damping(body, model, V)
     return replace(body, model=model, frame=frame, q=body.q @ V, q_dot=body.q_dot @ V, damping=damping)
 

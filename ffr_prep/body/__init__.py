@@ -15,7 +15,7 @@ from ffr_prep.body.chain import damping_ratio, free_vibrations
 from ffr_prep.body.constructors import check_point, recombined, rigid_body, with_point
 from ffr_prep.body.cut_error import CUT_ERROR, cut_doubt, cut_error, cut_errors_of, cut_stress_doubt
 from ffr_prep.body.damping import Damping, damped, with_damping
-from ffr_prep.body.fewer_modes import CUT_PAIR, cut_pair, paired, truncated
+from ffr_prep.body.fewer_modes import CUT_PAIR, KEPT, cut_pair, cut_twins, paired, truncated, with_cut
 from ffr_prep.body.file import MAKE_AGAIN, content_hash, load_body, save_arrays, save_body, surface_arrays, surface_of
 from ffr_prep.body.frame_change import interface_motions, mass_of_motions
 from ffr_prep.body.mean_axis import FrameMarker, MeanAxisForm, idle_loads, mean_axis_form, mean_axis_surface
@@ -61,6 +61,7 @@ from ffr_prep.body.units_doubt import units_doubts
 __all__ = [
     "CUT_ERROR",
     "CUT_PAIR",
+    "KEPT",
     "MAKE_AGAIN",
     "MESH_ERROR",
     "PRODUCTS",
@@ -89,6 +90,7 @@ __all__ = [
     "cut_names",
     "cut_pair",
     "cut_stress_doubt",
+    "cut_twins",
     "damped",
     "damping_ratio",
     "displacements",
@@ -125,6 +127,7 @@ __all__ = [
     "truncated",
     "units_doubts",
     "values",
+    "with_cut",
     "with_damping",
     "with_point",
 ]

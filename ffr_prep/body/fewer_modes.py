@@ -15,6 +15,7 @@ from ffr_prep.body.steady_stress import of_fewer_shapes
 from ffr_prep.common.arrays import Array
 
 CUT_PAIR = "cut_pair"  # of the provenance: what is to say of a number of modes that cuts one
+KEPT = "modes that are kept"
 _SAME = 1e-3  # relative difference of frequencies that a symmetric body has twice: that of its mesh
 
 
@@ -62,20 +63,31 @@ def _of_modes(provenance: Mapping[str, Any], keep: Array) -> Mapping[str, Any]:
 
 def _with_cut_pair(provenance: Mapping[str, Any], body: FlexibleBody, modes: int | Array) -> Mapping[str, Any]:
     """With what is to say of a number of modes; single ones are chosen by who knows them."""
-    told = cut_pair(body.omega2, int(modes), "modes that are kept") if np.ndim(modes) == 0 else ()
+    return with_cut(provenance, cut_pair(body.omega2, int(modes), KEPT) if np.ndim(modes) == 0 else ())
+
+
+def with_cut(provenance: Mapping[str, Any], told: tuple[str, ...]) -> Mapping[str, Any]:
+    """With what is told of a pair that is cut, instead of what was told of another number."""
     others = {key: value for key, value in provenance.items() if key != CUT_PAIR}
     return {**others, CUT_PAIR: told[0]} if told else others
 
 
 def cut_pair(omega2: Array, count: int, what: str) -> tuple[str, ...]:
     """Says so when the first mode that is left out, of those of ascending omega2, has the frequency of the last one kept."""
-    if not 0 < count < omega2.size or not paired(omega2)[count - 1]:
+    if not 0 < count < omega2.size:
         return ()
-    alone = np.flatnonzero(~paired(omega2)[: count - 1])
+    return cut_twins(paired(omega2), count, what, f"frequency ({np.sqrt(omega2[count]) / (2 * np.pi):.4g} Hz)")
+
+
+def cut_twins(twins: Array, count: int, what: str, equal: str) -> tuple[str, ...]:
+    """Says so when `count` shapes leave out the twin of the last one; twins (p - 1,): whether a shape is that of the next."""
+    if not 0 < count <= twins.size or not twins[count - 1]:
+        return ()
+    alone = np.flatnonzero(~twins[: count - 1])
     fewer = f", or for {alone[-1] + 1}" if alone.size else ""
     return (
-        f"the number of {what}, {count}, cuts a pair of equal frequency ({np.sqrt(omega2[count]) / (2 * np.pi):.4g} Hz), as "
-        f"round and square bars have them: one plane is left stiffer than the other; ask for {count + 1}{fewer}",
+        f"the number of {what}, {count}, cuts a pair of equal {equal}, as round and square bars have them: one plane is left "
+        f"stiffer than the other; ask for {count + 1}{fewer}",
     )
 
 

@@ -17,6 +17,7 @@ _LIGHTEST = (
 )
 _FAR = 20.0  # diagonals of the body between it and a point that is attached to it
 _SPREAD = 100.0  # of the farthest point of a body without a shape, which its radius of gyration is not beyond
+_BALL = 9.02  # volume of a ball over the cube of its radius of gyration, 4 pi / 3 (5 / 3)^1.5: no solid has more
 _THIN = 1e-2  # kg/m^3 over the cube of the radius of gyration, below which an inertia in kg mm^2 is, and no rotor
 
 
@@ -52,18 +53,28 @@ def _of_shape(body: FlexibleBody) -> Iterator[str]:
 
 
 def _of_points(body: FlexibleBody) -> Iterator[str]:
-    """Of a body without a shape: its inertia against the places of its points."""
-    if body.surface is not None or not body.interfaces:
+    """Of a body without a shape: its mass against its inertia, and its inertia against the places of its points."""
+    if body.surface is not None:
         return
+    gyration = _gyration(body)
+    if body.n and body.mass > _HEAVIEST * _BALL * gyration**3:  # rigid ones are often points of mass
+        yield (
+            f"it has a mass of {body.mass:.3g} kg and a radius of gyration of {gyration:.3g} m, heavier than any solid: are "
+            "its lengths metres, or its masses in tonnes or grams?"
+        )
     centre = body.r_dm / body.mass
-    reach = max(float(np.linalg.norm(interface.position - centre)) for interface in body.interfaces)
-    second = float(np.trace(body.rr_dm)) / body.mass - float(centre @ centre)
-    gyration = float(np.sqrt(max(second, 0.0)))
+    reach = max((float(np.linalg.norm(interface.position - centre)) for interface in body.interfaces), default=0.0)
     if reach > 0 and gyration > _SPREAD * reach and body.mass < _THIN * gyration**3:
         yield (
             f"its radius of gyration is {gyration:.3g} m and its farthest point {reach:.3g} m from its centre: is the "
             "inertia in kg mm^2? It is in kg m^2"
         )
+
+
+def _gyration(body: FlexibleBody) -> float:
+    """[m] root of the mean square of the distance of the mass from its centre."""
+    centre = body.r_dm / body.mass
+    return float(np.sqrt(max(float(np.trace(body.rr_dm)) / body.mass - float(centre @ centre), 0.0)))
 
 
 def _of_places(body: FlexibleBody) -> Iterator[str]:

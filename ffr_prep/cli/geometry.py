@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import click
 
-from ffr_prep.cli.options import TIME_LIMIT, bundle, interface_of, numbers_of, tell_of_programs
+from ffr_prep.cli.options import OF_VOLUME, TIME_LIMIT, bundle, interface_of, numbers_of, tell_of_programs
 from ffr_prep.cli.terminal import filed, show
 from ffr_prep.common.command import INPUT_FILE, OUTPUT_FILE, reserve
 from ffr_prep.common.errors import InputError
@@ -30,7 +31,7 @@ Regions: wherever a surface is named, it may be found by what it is instead.
 UNIT = click.option(
     "--unit",
     type=click.Choice(["m", "cm", "mm", "in"]),
-    help="Unit of the numbers in the file; default: what a STEP file declares, mm for IGES, m for others.",
+    help="Unit of the numbers in the file; default: what a STEP or .unv file declares, mm for IGES, m for others.",
 )
 SOLIDS = click.option(
     "--solid", "solids", multiple=True, metavar="NAME", help="Of a CAD file with several solids keep this one; repeat."
@@ -95,7 +96,10 @@ def faces_command(
 @click.command("rigid", epilog=REGIONS)
 @_PART
 @click.option("--density", type=float, help="Of all that is in the file [kg/m^3].")
-@click.option("--material", metavar="MATERIAL", help="Instead: a material, such as steel, whose density counts.")
+@click.option(
+    "--material", "materials", multiple=True, metavar="MATERIAL",
+    help="Instead: a material, such as steel, whose density counts.",
+)  # fmt: skip
 @click.option(
     "--interface", "interfaces", multiple=True, metavar="INTERFACE",
     help="A point for joints and forces: NAME=REGION, at the centre of these faces, or NAME@x,y,z [m]; repeat.",
@@ -111,7 +115,7 @@ def rigid_command(part: Path, interfaces: tuple[str, ...], output: Path, **optio
     from ffr_prep.pipelines.rigid import rigid_part
     from ffr_prep.report.text import short_lines
 
-    density = _density(options["density"], options["material"])
+    density = _density(options["density"], options["materials"])
     points = [interface_of(text) for text in interfaces]
     reserve("-o", output, usual=".ffr")
     tell_of_programs([part])
@@ -122,11 +126,16 @@ def rigid_command(part: Path, interfaces: tuple[str, ...], output: Path, **optio
     filed(output)
 
 
-def _density(density: float | None, material: str | None) -> float:
-    if (density is None) == (material is None):
+def _density(density: float | None, materials: tuple[str, ...]) -> float:
+    if (density is None) == (not materials):
         raise InputError("give the density, such as --density 7850, or a --material, such as steel")
     if density is not None:
         return density
+    if len(materials) > 1 or re.match(OF_VOLUME, materials[0]):
+        raise InputError(
+            f"--material {materials[-1]}: a rigid body has one density: make one of each volume (of CAD files by "
+            "--solid NAME) and join them by a fixed joint, or reduce the part, whose volumes may have materials of their own"
+        )
     from ffr_prep.model.material import parse_material
 
-    return parse_material(str(material)).rho
+    return parse_material(materials[0]).rho

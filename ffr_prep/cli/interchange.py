@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from ffr_prep.cli.request import OUTPUT
-from ffr_prep.cli.settings import EntriesCommand, NotesCommand
+from ffr_prep.cli.settings import EntriesCommand, NotesCommand, written
 from ffr_prep.cli.terminal import filed, show
 from ffr_prep.common.command import INPUT_FILE, OUTPUT_FILE, reserve
 from ffr_prep.interchange import formats
@@ -48,6 +48,7 @@ def export_body(body: Path, output: Path, surface: bool, **settings: Any) -> Non
     from ffr_prep.body import load_body
 
     reserve("-o", output)
+    formats.check_settings(output, written(formats.EXCHANGE_FORMATS))
     for lost in formats.export_body(load_body(body), output, surface, settings):
         click.echo(f"note        {lost}")
     filed(output)
@@ -74,7 +75,7 @@ def import_body(file: Path, units: str, held: bool, output: Path) -> None:
     Every node becomes an interface. What could not be taken over is said; nothing is left out silently. Where the file has
     no inertia for a motion, that is said too, here and before a run.
     """
-    from ffr_prep.body import save_body
+    from ffr_prep.body import save_body, units_doubts
     from ffr_prep.interchange.bare_inertia import held as held_fixed
     from ffr_prep.report.text import short_lines
 
@@ -83,6 +84,6 @@ def import_body(file: Path, units: str, held: bool, output: Path) -> None:
     body = held_fixed(body) if held else body
     save_body(body, output)
     show(short_lines(body))
-    for note in body.provenance["notes"]:
+    for note in [*body.provenance["notes"], *units_doubts(body)]:
         click.echo(f"note        {note}")
     filed(output)

@@ -97,6 +97,9 @@ def own_or_given(path: Path, mesh: Mesh, unit: str | None, given: Solid | Mappin
     return found
 
 
+OF_VOLUME = r"(?!(?:E[123]?|nu(?:12|13|23)?|G(?:12|13|23)|rho|name)=)([^=,]+)=(.+)"  # VOLUME=MATERIAL
+
+
 def material_of(texts: Sequence[str]) -> Solid | Mapping[str, Solid]:
     """One material, or materials by group where a text is GROUP=MATERIAL."""
     from ffr_prep.model.material import parse_material
@@ -106,9 +109,7 @@ def material_of(texts: Sequence[str]) -> Solid | Mapping[str, Solid]:
             "what is the part made of? Give --material steel, or another of the library, or E=2.1e11,nu=0.3,rho=7850; of "
             "several volumes --material VOLUME=steel for each"
         )
-    groups = [
-        re.fullmatch(r"(?!(?:E[123]?|nu(?:12|13|23)?|G(?:12|13|23)|rho|name)=)([^=,]+)=(.+)", text) for text in texts
-    ]
+    groups = [re.fullmatch(OF_VOLUME, text) for text in texts]
     if len(texts) == 1 and groups[0] is None:
         return parse_material(texts[0])
     wrong = [text for text, group in zip(texts, groups, strict=True) if group is None]
@@ -121,11 +122,12 @@ def material_of(texts: Sequence[str]) -> Solid | Mapping[str, Solid]:
 
 
 def interface_of(text: str) -> InterfaceRegion:
-    """NAME[=REGION][:rigid|mean][@x,y,z], the point at any place behind the name."""
+    """NAME[=REGION][:rigid|mean][@x,y,z], the kind and the point at any place behind the name."""
     from ffr_prep.mesh.geometry.region_words import is_query
     from ffr_prep.model.coupled import InterfaceRegion
 
     ordered = re.sub(r"(@[-+.\w]+(?:,[-+.\w]+)*)([=:].+)$", r"\2\1", text)
+    ordered = re.sub(r"^([^=:@]+):(\w+)=([^@]+)", r"\1=\3:\2", ordered)
     parts = re.fullmatch(r"([^=:@]+)(?:=(.+?))?(?::(\w+))?(?:@([^@]+))?", ordered)
     if parts is None:
         raise InputError(f"--interface {text}: write NAME, NAME:mean, NAME=SURFACE or NAME@x,y,z (see --help)")

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ffr_prep.cli.options import bundle
-from ffr_prep.cli.settings import numbers
+from ffr_prep.cli.settings import numbers, written
 from ffr_prep.common.command import OUTPUT_FILE
 from ffr_prep.common.errors import InputError
-from ffr_prep.reduction.registry import MODES, REDUCTIONS
+from ffr_prep.reduction.registry import MODES, REDUCTIONS, SELECTING, check_taken, method_of, takes
 from ffr_prep.reduction.registry import reduction_of as reduction_made
 
 if TYPE_CHECKING:
@@ -100,7 +100,14 @@ def damping_of(options: Mapping[str, Any]) -> Damping:
 
 def reduction_of(options: Mapping[str, Any]) -> Reduction:
     """The reduction that the options describe; InputError for options that do not fit each other."""
-    return reduction_made([{**options, "method": method} for method in dict.fromkeys(options["methods"])])
+    methods = list(dict.fromkeys(options["methods"]))
+    check_taken([*(name for name in SELECTING if options[name] is not None), *written(REDUCTIONS)], methods)
+    return reduction_made(
+        [
+            {"method": method} | {name: value for name, value in options.items() if takes(method_of(method), name)}
+            for method in methods
+        ]
+    )
 
 
 def band_of(options: Mapping[str, Any]) -> Band | None:

@@ -60,6 +60,13 @@ class EntriesCommand(NotesCommand):
         return [*own, *(option_of(setting) for registry in self.registries for setting in registry.settings()), last]
 
 
+def written(registry: Registry[Any]) -> list[str]:
+    """Names of the settings of its entries that the command line gives, defaults not among them."""
+    context = click.get_current_context(silent=True)
+    given = click.core.ParameterSource.COMMANDLINE
+    return [s.name for s in registry.settings() if context and context.get_parameter_source(s.name) == given]
+
+
 def _help_of(registry: Registry[Any]) -> str:
     """A name and what it is for, line by line."""
     lines = []

@@ -24,6 +24,8 @@ ENDINGS = {
     ".ffr": "a body file, which a scene names (file = ...) and `ffr-prep info` describes",
     ".nc": "a result file, which `ffr-dyn info`, `plot` and `animate` show",
     ".toml": "a text such as a scene, which `ffr-dyn run` analyses",
+    **dict.fromkeys((".sid_fem", ".sid"), "a body of another program, which `ffr-prep import` reads"),
+    ".fem": "a body of MBDyn, which `ffr-prep import` reads, or a mesh",
     **dict.fromkeys((".step", ".stp", ".iges", ".igs", ".brep", ".geo"), _CAD),
     **dict.fromkeys((".inp", ".bdf", ".nas", ".dat", ".msh", ".med", ".unv", ".vtu", ".frd"), _MESH),
 }

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -84,6 +84,17 @@ def register_exchange_format(entry: ExchangeFormat) -> None:
     >>> fp.register_exchange_format(fp.ExchangeFormat("own", "Own text.", (".own",), "own:write", None))
     """
     EXCHANGE_FORMATS.register(entry)
+
+
+def check_settings(path: Path, names: Iterable[str]) -> None:
+    """Raises InputError for a setting of another format than that of the suffix."""
+    entry = _format_of(path)
+    for name in names:
+        owners = [one.name for one in EXCHANGE_FORMATS if name in {setting.name for setting in one.settings}]
+        if entry.name not in owners:
+            raise InputError(
+                f"{path}: --{name} is for {' and '.join(owners)}, and this is a file of {entry.name}: leave it out"
+            )
 
 
 def export_body(body: FlexibleBody, path: Path, surface: bool, settings: Mapping[str, Any]) -> tuple[str, ...]:

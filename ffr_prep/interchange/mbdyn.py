@@ -157,9 +157,10 @@ def _lumped(body: FlexibleBody, at: tuple[Interface, ...]) -> Array:
     target = np.concatenate([(total / scale[..., 0]).ravel() for total, scale in zip(sums, scales, strict=True)])
     masses, misfit = nodal_masses(rows, target)
     if misfit > MISFIT_LIMIT:
+        more = "export the surface points too (--surface), or" if len(at) == len(body.interfaces) else "take"
         raise InputError(
             f"body {body.name!r}: masses at the {len(at)} nodes miss its inertia integrals by {misfit:.1e} (at most "
-            f"{MISFIT_LIMIT}): export the surface points too (--surface), or the kind 'full' (--kind full)"
+            f"{MISFIT_LIMIT}): {more} the kind 'full' (--kind full)"
         )
     return np.hstack([np.repeat(masses[:, None], 3, axis=1), np.zeros((len(at), 3))])
 

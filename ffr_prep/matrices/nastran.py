@@ -188,6 +188,12 @@ def _reading(path: Path) -> Iterator[None]:
             "NumPy 1.26), or write K and M to .npz elsewhere, by pyNastran and scipy.sparse.save_npz"
         ) from None
     except Exception as error:  # the reader raises whatever its parsers meet
+        if isinstance(error, AttributeError) and "module 'numpy'" in str(error):
+            raise InputError(
+                f"the pyNastran that is installed does not work with NumPy {np.__version__} ({error}): install both in an "
+                "environment of their own (pip install pyNastran brings a NumPy that fits), and write K and M to .npz there, "
+                "by pyNastran and scipy.sparse.save_npz"
+            ) from None
         raise InputError(f"pyNastran cannot read {path} ({type(error).__name__}: {error})") from None
 
 

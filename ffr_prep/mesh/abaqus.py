@@ -17,6 +17,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
@@ -26,9 +27,11 @@ from ffr_prep.mesh.left_out import left_out_of_abaqus
 
 Row = list[str]
 
-# Corners of the faces S1, S2, ... of tetrahedra and hexahedra. The node order of the elements is that of VTK.
+# Corners of the faces S1, S2, ... of tetrahedra and hexahedra. The node order of the elements is that of VTK but for the last
+# seven nodes of C3D27: the centre, then those of the faces S1 to S6.
 _TET_FACES = ((0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0))
 _HEX_FACES = ((0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0))
+_HEX27 = [*range(20), 26, 24, 23, 25, 21, 22, 20]
 _SOLID = re.compile(r"(?:C3D|DC3D)(\d+)")
 _PLANE = re.compile(r"(?:S|SC|STRI|CPS|CPE|CPEG|CAX|M3D|SFM3D|R3D|DS|DC2D)(3|4|6|8|9|65)(?!\d)")
 _CORNERS = {3: 3, 6: 3, 65: 3, 4: 4, 8: 4, 9: 4}
@@ -54,6 +57,9 @@ class _Deck:
     notes: list[str] = field(default_factory=list)
     found: Counter[str] = field(default_factory=Counter)
     instances: int = 0
+    placed: tuple[Array, Array] | None = (
+        None  # axes (3, 3) and origin (3,) of the one part, where its instance moves it
+    )
     in_assembly: bool = False  # beside its instances, where numbers count anew
     reference_points: int = 0
 
@@ -79,10 +85,9 @@ def nodes_from_abaqus(path: Path) -> tuple[Array, Array, dict[str, Array]]:
         sets = {deck.spelling[name]: np.unique(_resolved(name, deck.node_sets)) for name in deck.node_sets}
     except KeyError as error:
         raise InputError(f"{path} refers to {error.args[0]}, which it does not define; is it complete?") from None
-    points = np.array(list(deck.nodes.values()), float).reshape(-1, 3)
     return (
         np.array(list(deck.nodes), np.int64),
-        points,
+        _points(deck),
         {name: of.astype(np.int64) for name, of in sets.items() if of.size},
     )
 
@@ -110,9 +115,9 @@ def keyword_sections(path: Path, above: tuple[Path, ...] = ()) -> Iterator[tuple
     """Keyword, parameters (in upper case, values as written) and data rows, through included files."""
     if path.resolve() in above:
         raise InputError(f"it includes itself: {' -> '.join(one.name for one in (*above, path))}")
-    for block in re.split(r"^\*(?!\*)", _without_comments(path), flags=re.MULTILINE)[1:]:
+    for block in re.split(r"^[ \t]*\*(?!\*)", _without_comments(path), flags=re.MULTILINE)[1:]:
         header, _, data = block.partition("\n")
-        while header.rstrip().endswith(",") and re.match(r"[ \t]*[A-Za-z ]+=", data):
+        while header.rstrip().endswith(",") and re.match(r"[ \t]*[A-Za-z]", data):
             more, _, data = data.partition("\n")
             header += more
         keyword, *settings = (" ".join(word.split()) for word in header.split(","))
@@ -205,8 +210,23 @@ def _read_surface(deck: _Deck, parameters: Mapping[str, str], rows: list[Row]) -
 def _read_instance(deck: _Deck, parameters: Mapping[str, str], rows: list[Row]) -> None:
     deck.instances += 1
     deck.in_assembly = False
-    if deck.instances > 1 or rows:
+    if deck.instances > 1:
         raise InputError("it places parts in an assembly; write the one part to reduce to a file of its own")
+    if rows:
+        deck.placed = _placed([[float(word or 0) for word in row] for row in rows])
+
+
+def _placed(rows: list[list[float]]) -> tuple[Array, Array]:
+    """Axes and origin of an instance: it is shifted first, then turned by an angle [deg] about a line through two points."""
+    shift, *turn = rows
+    axes, origin = np.eye(3), np.array([*shift, 0.0, 0.0, 0.0][:3])
+    if turn:
+        first, along, angle = np.array(turn[0][:3]), np.subtract(turn[0][3:6], turn[0][:3]), np.radians(turn[0][6])
+        if not along.any():
+            raise InputError("an instance turns about a line whose two points are one; give it another, or no turn")
+        axes = Rotation.from_rotvec(angle * along / np.linalg.norm(along)).as_matrix()
+        origin = first + axes @ (origin - first)
+    return axes, origin
 
 
 def _enter_assembly(deck: _Deck, parameters: Mapping[str, str], rows: list[Row]) -> None:
@@ -254,6 +274,12 @@ def _extend(deck: _Deck, sets: dict[str, list[str]], name: str, members: list[st
 # ---- to arrays ----------------------------------------------------------------------------------------------------
 
 
+def _points(deck: _Deck) -> Array:
+    """(N, 3) where the one instance has them."""
+    points = np.array(list(deck.nodes.values()), float).reshape(-1, 3)
+    return points if deck.placed is None else points @ deck.placed[0].T + deck.placed[1]
+
+
 def _file_mesh(deck: _Deck) -> FileMesh:
     index = {number: k for k, number in enumerate(deck.nodes)}
     solids = {kind: elements for kind, elements in deck.solids.items() if elements}
@@ -265,8 +291,8 @@ def _file_mesh(deck: _Deck) -> FileMesh:
     corners = {name: [face[: _CORNERS[len(face)]] for face in faces] for name, faces in (planes | sides).items()}
     nodes = {name: _resolved(name, deck.node_sets) + _nodes_of(deck, name) for name in deck.node_sets}
     return FileMesh(
-        points=np.array(list(deck.nodes.values()), float).reshape(-1, 3),
-        blocks=tuple((kind, _indices(index, list(elements.values()))) for kind, elements in solids.items()),
+        points=_points(deck),
+        blocks=tuple((kind, _nodes_in_order(kind, _indices(index, list(of.values())))) for kind, of in solids.items()),
         volumes={deck.spelling[name]: np.unique(of) for name, of in volumes.items() if of},
         faces={deck.spelling[name]: _by_size(index, of) for name, of in corners.items() if of},
         nodes={deck.spelling[name]: np.unique(_indices(index, [of])) for name, of in nodes.items() if of},
@@ -296,6 +322,10 @@ def _indices(index: Mapping[int, int], numbers: list[list[int]]) -> Array:
         raise KeyError(f"node {error.args[0]}") from None
 
 
+def _nodes_in_order(kind: str, nodes: Array) -> Array:
+    return nodes[:, _HEX27] if kind == "hex27" else nodes
+
+
 def _by_size(index: Mapping[int, int], faces: list[list[int]]) -> tuple[Array, ...]:
     parts = [[face for face in faces if len(face) == size] for size in (3, 4)]
     return tuple(_indices(index, part) for part in parts if part)
@@ -305,8 +335,10 @@ def _resolved(name: str, sets: Mapping[str, list[str]], within: tuple[str, ...] 
     """Numbers in a set, through the sets it names; a number may carry the name of its instance."""
     numbers: list[int] = []
     for member in sets[name]:
-        plain = member.rpartition(".")[2].upper()
-        if plain.isdecimal():
+        whole, plain = member.upper(), member.rpartition(".")[2].upper()
+        if whole in sets and whole not in (*within, name):  # a name may hold a point, too
+            numbers += _resolved(whole, sets, (*within, name))
+        elif plain.isdecimal():
             numbers.append(int(plain))
         elif plain in sets and plain not in (*within, name):
             numbers += _resolved(plain, sets, (*within, name))

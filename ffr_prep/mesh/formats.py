@@ -40,7 +40,7 @@ MESH_FORMATS: Registry[MeshFormat] = Registry(
     (
         MeshFormat(
             "meshio",
-            "VTK (.vtu) and whatever else meshio reads",
+            "VTK (.vtu), Medit (.mesh), and whatever else meshio reads",
             "ffr_prep.mesh.meshio_files:from_meshio",
             (_ANY,),
         ),

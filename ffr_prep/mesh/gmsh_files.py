@@ -29,6 +29,7 @@ from ffr_prep.mesh import gmsh_process
 from ffr_prep.mesh.cells import node_order
 from ffr_prep.mesh.file_mesh import DrawnFace, FileMesh, FileSkin, FileSolid, supported_kind
 from ffr_prep.mesh.formats import MOST_ELEMENTS
+from ffr_prep.mesh.geometry.face import METRES
 from ffr_prep.mesh.geometry.step_text import face_labels, length_unit
 from ffr_prep.mesh.time_limit import limit
 
@@ -67,8 +68,20 @@ def from_gmsh(path: Path, **wanted: Any) -> FileMesh:
 
 
 def mesh_from_gmsh(path: Path) -> FileMesh:
-    """A mesh that gmsh reads; errors as in `from_gmsh`."""
-    return from_gmsh(path)
+    """A mesh that gmsh reads, in the unit that a universal file declares, but metres, which some write whatever they have;
+    errors as in `from_gmsh`."""
+    mesh = from_gmsh(path)
+    declared = _unit_of_universal(path) if path.suffix.lower() == ".unv" else None
+    return mesh if declared in (None, "m") else replace(mesh, unit=declared)
+
+
+def _unit_of_universal(path: Path) -> str | None:
+    """By the factor of dataset 164 by which lengths are divided to be metres (I-deas Test Data Format); None of others."""
+    found = re.search(
+        r"^ *-1 *\n *164 *\n.*\n *([\d.]+)[DE]([+-]\d+)", read_text(path, "a universal file"), re.MULTILINE
+    )
+    factor = float(f"{found[1]}e{found[2]}") if found else 0.0
+    return next((unit for unit, metres in METRES.items() if abs(factor * metres - 1) < 1e-3), None)
 
 
 def skin_from_gmsh(path: Path, **wanted: Any) -> FileSkin:

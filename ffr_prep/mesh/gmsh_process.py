@@ -296,8 +296,23 @@ def _surfaces(gmsh: Any) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
     return arrays, names
 
 
+def _check_orders(gmsh: Any) -> None:
+    """Refuse volumes of elements of both orders: gmsh lists those alone that are as the first of their shape, and gives the
+    nodes of all as if they were, or crashes."""
+    counted = sum(
+        gmsh.option.getNumber(f"Mesh.Nb{shape}") for shape in ("Tetrahedra", "Hexahedra", "Prisms", "Pyramids")
+    )
+    listed = sum(len(of) for volume in gmsh.model.getEntities(3) for of in gmsh.model.mesh.getElements(*volume)[1])
+    if listed < counted:
+        raise RefusedError(
+            "a volume has elements of first and of second order beside each other, which gmsh does not tell apart: save the "
+            "mesh with elements of one order"
+        )
+
+
 def _add_volumes(gmsh: Any, index_of: np.ndarray, arrays: dict[str, np.ndarray], names: dict[str, Any]) -> None:
     """Elements by kind, and the members of each volume group as (kind, numbers within the kind)."""
+    _check_orders(gmsh)
     groups = _groups(gmsh, 3)
     entities = sorted({tag for members in groups.values() for tag in members})
     if len(entities) < len(gmsh.model.getEntities(3)):

@@ -118,9 +118,9 @@ def read_mesh(
 ) -> Mesh:
     """A mesh from a file, in metres; geometry (.geo, .step, .iges, .brep) is meshed by gmsh first.
 
-    unit     : of the numbers in the file, "m", "cm", "mm" or "in"; without it the unit that a STEP file declares,
-               millimetres for IGES, which is converted to them, and metres for every other file. Another unit than a STEP
-               or IGES file declares is refused
+    unit     : of the numbers in the file, "m", "cm", "mm" or "in"; without it the unit that a STEP file declares, or a
+               universal file (.unv), millimetres for IGES, which is converted to them, and metres for every other file.
+               Another unit than a STEP or IGES file declares is refused
     size     : largest element edge when geometry is meshed, in the unit of the file [m, cm, mm or in]
     numbers  : parameters of a .geo script to change, by name, lengths in the unit of the script [m, mm ...]
     order    : 1 or 2, of the elements when geometry is meshed, 2 when not given; second-order elements follow curved
@@ -152,7 +152,15 @@ def read_mesh(
         known = unit or read.unit
         mesh = _in_metres(read, known or "m")
     length = float(np.ptp(mesh.points, axis=0).max())
-    return replace(mesh, notes=(*mesh.notes, *doubtful_unit(length, known), *_doubtful_size(length, mesh.unit, size)))
+    doubts = [*_contradicted(unit, read.unit), *doubtful_unit(length, known), *_doubtful_size(length, mesh.unit, size)]
+    return replace(mesh, notes=(*mesh.notes, *doubts))
+
+
+def _contradicted(given: str | None, declared: str | None) -> list[str]:
+    """A note on a unit that is given where the file declares another, of formats whose files are not always right."""
+    if not given or not declared or given == declared:
+        return []
+    return [f"the file declares that its numbers are {declared}, and they are read as {given}, which was given"]
 
 
 def cad_settings(

@@ -1,4 +1,4 @@
-"""Meshes of other programs (VTK, ...) that meshio reads, brought to plain arrays."""
+"""Meshes of other programs (VTK, Medit, ...) that meshio reads or holds, brought to plain arrays."""
 
 from __future__ import annotations
 
@@ -14,11 +14,13 @@ from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 from ffr_prep.common.reading import not_of_its_ending
 from ffr_prep.mesh.file_mesh import FileMesh, supported_kind
+from ffr_prep.mesh.medit import from_medit
 
 _VOLUMES = {"tetra": "tet4", "tetra10": "tet10", "hexahedron": "hex8", "hexahedron20": "hex20", "hexahedron27": "hex27"}
 _FACES = {"triangle": 3, "triangle6": 3, "triangle7": 3, "quad": 4, "quad8": 4, "quad9": 4}
 _MOST_TAGS = 100
 _NO_NODE_TAGS = ("gmsh:dim_tags",)
+_SAVE = "save the mesh as .msh, .med, .unv, .inp, .bdf or .vtu"
 
 Groups = Mapping[str, Sequence[Array]]
 
@@ -40,14 +42,20 @@ def from_meshio(path: Path) -> FileMesh:
 
 
 def _read(path: Path) -> meshio.Mesh:
-    """meshio's readers raise whatever comes, exit, and write to the terminal."""
+    """meshio's readers raise whatever comes, exit, and write to the terminal; its reader of Medit stops at second order."""
+    if path.suffix.lower() == ".mesh":
+        return from_medit(path)
+    if not path.name.lower().endswith(tuple(meshio.extension_to_filetypes)):
+        raise InputError(
+            not_of_its_ending(path, "a mesh", f"has an ending that no reader knows: {_SAVE}, or a geometry as .step")
+        )
     with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()) as said:
         try:
             return meshio.read(path)
         except (Exception, SystemExit) as error:
             first = [] if isinstance(error, SystemExit) else [f"{type(error).__name__}: {error}"]
             words = " ".join([*first, *said.getvalue().split()])
-    fault = f"cannot be read as a mesh ({words}); is it complete, and does its ending name its format?"
+    fault = f"cannot be read as a mesh ({words}); is it complete, and does its ending name its format? If so, {_SAVE}"
     raise InputError(not_of_its_ending(path, "a mesh", fault))
 
 

@@ -59,6 +59,11 @@ def from_nastran(path: Path) -> FileMesh:
         for card in cards(path):
             _take(deck, card)
             deck.found[_kind(card)] += 1
+        if not deck.grids:
+            raise InputError(
+                "it has no GRID: is it Nastran bulk data? Meshes of other programs with this ending, as Ansys has .dat, are "
+                "not read: save them as .msh, .med, .unv, .inp, .bdf or .vtu"
+            )
         return _file_mesh(deck)
     except InputError as error:
         text = str(error)

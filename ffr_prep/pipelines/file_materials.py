@@ -152,6 +152,7 @@ def _of_abaqus(path: Path) -> tuple[dict[str, _Constants], dict[str, str]]:
     found: dict[str, _Constants] = {}
     of_group: dict[str, str] = {}
     oriented: set[str] = set()  # materials, which are alike in all directions or have axes that are not read
+    turned = False  # the one part by its instance, and its material with it
     current = _Constants("")
     for keyword, parameters, rows in keyword_sections(path):
         if keyword == "MATERIAL":
@@ -174,8 +175,11 @@ def _of_abaqus(path: Path) -> tuple[dict[str, _Constants], dict[str, str]]:
             _once(f"element set {group!r}", "material", of_group.get(group), name)
             of_group[group] = name
             oriented |= {name} if "ORIENTATION" in parameters else set()
-    if any(found[name].kind != "ISOTROPIC" for name in oriented & set(found)):
-        raise InputError(f"{path}: a section has an ORIENTATION, which is not read; give --material with axes")
+        elif keyword == "INSTANCE":
+            turned = len(rows) > 1
+    if any(found[name].kind != "ISOTROPIC" for name in (set(found) if turned else oriented & set(found))):
+        why = "an instance turns its part" if turned else "a section has an ORIENTATION, which is not read"
+        raise InputError(f"{path}: {why}; give --material with axes")
     return found, of_group
 
 

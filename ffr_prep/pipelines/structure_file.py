@@ -49,6 +49,7 @@ from ffr_prep.pipelines.structure_schema import (
     InterfaceEntry,
     MemberEntry,
     PanelEntry,
+    ReductionEntry,
     ReferenceEntry,
     SolidEntry,
     StructureEntry,
@@ -110,6 +111,11 @@ def read_structure(path: str | Path, progress: Stages = no_stages, *, entries: M
         raise InputError(str(error) if str(path) in str(error) else f"{path}: {error}") from None
 
 
+def _given(entry: ReductionEntry) -> dict[str, Any]:
+    """What a reduction is given, without the defaults of settings that its method may not have."""
+    return {name: getattr(entry, name) for name in ("method", *entry.model_fields_set)}
+
+
 def _structure(path: Path, entry: StructureEntry, progress: Stages) -> Structure:
     members, shells = _members(entry), _shells(entry)
     frame = named(_frame(entry, path.parent, members, shells, progress), **entry.nodes)
@@ -121,7 +127,7 @@ def _structure(path: Path, entry: StructureEntry, progress: Stages) -> Structure
         request=Request(
             name=entry.name or path.stem,
             reference=_reference(entry.reference),
-            reduction=reduction_of([vars(of) for of in entry.reduction], path.parent),
+            reduction=reduction_of([_given(of) for of in entry.reduction], path.parent),
             linear=entry.linear,
             drawn_modes=entry.drawn_modes,
             stress=entry.stress,

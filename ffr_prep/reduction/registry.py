@@ -5,7 +5,7 @@ Nothing else lists them: options, keys, help and messages are made from these en
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from ffr_prep.reduction.basis import Reduction
 
 MODES = 10  # of what keeps normal modes, when nothing is said
+SELECTING = ("modes", "frequency", "accuracy")
 OF_FILES = "FILE"
 
 
@@ -130,20 +131,32 @@ def reduction_of(requests: Sequence[Mapping[str, Any]], folder: Path = Path()) -
     """
     from ffr_prep.reduction.methods.union import Union
 
-    _check_modes(requests)
+    for request in requests:
+        check_taken([name for name, value in request.items() if value is not None], [request["method"]])
     parts = tuple(_made(method_of(request["method"]), request, folder) for request in requests)
     return parts[0] if len(parts) == 1 else Union(parts)
 
 
-def _check_modes(requests: Sequence[Mapping[str, Any]]) -> None:
-    """Raises InputError where modes are asked for, and no method keeps any."""
-    asked = [name for name in ("modes", "frequency", "accuracy") if any(one.get(name) is not None for one in requests)]
-    methods = [request["method"] for request in requests]
-    if asked and not any(method_of(method).selects for method in methods):
+def check_taken(names: Iterable[str], methods: Sequence[str]) -> None:
+    """Raises InputError for a value by the name of a setting, or of how many normal modes to keep, that no method takes."""
+    for name in names:
+        owners = [entry.name for entry in REDUCTIONS if takes(entry, name)]
+        if not owners or any(takes(method_of(method), name) for method in methods):
+            continue
+        if name in SELECTING:
+            raise InputError(
+                f"{name} says which normal modes to keep, and {' and '.join(methods)} keeps none: leave it out, or add the "
+                "method craig-bampton"
+            )
         raise InputError(
-            f"{asked[0]} says which normal modes to keep, and {' and '.join(methods)} keeps none: leave it out, or add the "
-            "method craig-bampton"
+            f"{name} is a setting of {' and '.join(owners)}, and not of {' and '.join(methods)}: leave it out, or take the "
+            f"method {owners[0]}"
         )
+
+
+def takes(entry: ReductionMethod, name: str) -> bool:
+    """Whether a method has a use for a value of this name."""
+    return entry.selects if name in SELECTING else any(setting.name == name for setting in entry.settings)
 
 
 def _made(entry: ReductionMethod, given: Mapping[str, Any], folder: Path) -> Reduction:

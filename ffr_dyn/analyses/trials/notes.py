@@ -25,7 +25,7 @@ from ffr_dyn.consistency.step_error import (
     too_coarse,
     worst,
 )
-from ffr_dyn.consistency.unresolved import leading
+from ffr_dyn.consistency.unresolved import damped_less, leading
 from ffr_dyn.integrators import Within
 from ffr_dyn.integrators.ros2 import Twin
 from ffr_dyn.linear.departure import at_rest_in_part, departures, places, pushed
@@ -46,6 +46,7 @@ def finished(runs: Runs, trial: Trial, path: str | Path | None, ringing: Set[str
         *result.attributes["notes"],
         *unseen,
         *(_untold(runs) if trial.errors else ()),
+        *(_damped_less(runs) if trial.errors else ()),
         *_unresolved(runs, trial, ringing),
         *result.attributes.get("missed", ()),
         *_coarse(trial),
@@ -94,6 +95,12 @@ def _untold(runs: Runs) -> list[str]:
         f"{', ...' * (len(times) > SHOWN)} s, where no step ends, and steps are of first order there; {_way_to_tell(what)}"
         for what, times in runs.untold.items()
     ]
+
+
+def _damped_less(runs: Runs) -> list[str]:
+    """Notes on bodies that are damped by less than their ratios say; vibrations are found where some are damped."""
+    damped = any(body.damping.any() for body in runs.assembled.system.scene.bodies)
+    return damped_less(runs.vibrations) if damped else []
 
 
 def _way_to_tell(what: str) -> str:

@@ -163,6 +163,26 @@ def test_coordinates_of_the_plane_that_damping_couples_with_others_stay_in_space
     assert fd.assemble(replace(held(coupled(bar)), plane="auto")).system.scene.plane == "none"
 
 
+@pytest.mark.parametrize(("hold", "told"), [("fixed", True), ("none", False)])
+def test_a_run_tells_the_ratio_that_comes_of_one_of_the_free_body(bar, hold, told):
+    """Clamped it is that of the eigenvalues of the scene, which `linearise` finds; free it is the one that is given."""
+    scene = held(bar, damping=0.01) if hold == "fixed" else fd.Scene((fd.Body("arm", bar, damping=0.01),))
+    run = fd.forward(scene, end=0.004, output_step=0.002)
+    notes = [note for note in run.attributes["notes"] if "belongs to the modes of the free body" in note]
+    assert len(notes) == told
+    found = fd.linearise(scene)
+    ratio = found.damping_ratios[found.frequencies > 1.0].min()
+    assert ratio == pytest.approx(0.01, rel=1e-3) if not told else 0.0 < ratio < 0.002
+    assert all(f"{found.frequencies[0]:.4g} Hz, has {ratio:.2g}. For 0.01" in note for note in notes)
+
+
+def test_a_ratio_of_the_body_as_it_is_held_is_not_told(bar):
+    scene = held(fp.damped(bar, ratios=[0.01]))
+    run = fd.forward(scene, end=0.004, output_step=0.002)
+    assert not [note for note in run.attributes["notes"] if "damping ratio" in note]
+    assert fd.linearise(scene).damping_ratios[0] == pytest.approx(0.01, rel=1e-3)
+
+
 # ---- against the full finite-element model ------------------------------------------------------------------------
 
 

@@ -52,6 +52,17 @@ def test_a_sound_body_raises_no_doubt():
     assert fp.units_doubts(thin) == []
 
 
+@pytest.mark.parametrize(("length", "heavy"), [(1.0, False), (1e-2, True), (1e-3, True)])
+def test_a_flexible_body_without_a_shape_is_no_heavier_than_a_solid(length, heavy):
+    """As one of another program in units that are not its own. No solid has more volume for its radius of gyration than a
+    ball, whose second moment is 3/5 of m R^2; rigid bodies are often points of mass."""
+    bar = body()
+    small = replace(bar, surface=None, r_dm=length * bar.r_dm, rr_dm=length**2 * bar.rr_dm)
+    assert ["heavier than any solid" in doubt for doubt in fp.units_doubts(small)] == [True] * heavy
+    rigid = fp.truncated(small, 0)
+    assert fp.units_doubts(rigid) == []
+
+
 def test_a_point_far_from_its_place_is_told():
     """On the surface between its nodes is near enough; beside the body and inside is not, in whole and in parts."""
     ends = [fp.InterfaceRegion("left"), fp.InterfaceRegion("right")]

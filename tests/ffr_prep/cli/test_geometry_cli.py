@@ -70,6 +70,8 @@ def test_a_rigid_body_of_the_same_file(folder, tmp_path, capsys):
     np.testing.assert_allclose(body.interfaces[0].position, [0.045, 0.025, 0.005], atol=1e-9)
     run("info", path)
     assert "a rigid body: it does not deform" in capsys.readouterr().out
+    run("rigid", folder / "plate.step", "--material", "steel", "--material", "aluminium", "-o", path, code=2)
+    assert "a rigid body has one density: make one of each volume" in capsys.readouterr().err
 
 
 @pytest.mark.slow

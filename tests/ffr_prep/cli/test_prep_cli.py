@@ -376,6 +376,9 @@ def test_body_files_that_cannot_be_used(damage, command, body_file, tmp_path, ca
         ("hook=tip:mean@0.1,-2,3e-2", InterfaceRegion("hook", "tip", "mean", (0.1, -2.0, 0.03))),
         ("hook@0.1,-2,3e-2=plane z=10", InterfaceRegion("hook", "plane z=10", "rigid", (0.1, -2.0, 0.03))),
         ("hook@0.1,-2,3e-2=tip:mean", InterfaceRegion("hook", "tip", "mean", (0.1, -2.0, 0.03))),
+        ("hook:mean=tip", InterfaceRegion("hook", "tip", "mean")),
+        ("hook:mean@0.1,-2,3e-2=tip", InterfaceRegion("hook", "tip", "mean", (0.1, -2.0, 0.03))),
+        ("hook:mean=tip@0.1,-2,3e-2", InterfaceRegion("hook", "tip", "mean", (0.1, -2.0, 0.03))),
     ],
 )
 def test_interfaces(text, region):

@@ -557,6 +557,9 @@ def test_the_writer_refuses_and_leaves_files_alone(tmp_path, monkeypatch):
         write_fem(body, path, kind="new")
     with pytest.raises(InputError, match=r"masses at the 3 nodes miss its inertia integrals by .*surface points"):
         write_fem(body, path, kind="legacy")
+    away = replace(body, surface=replace(body.surface, Phi=0.1 * body.surface.Phi))
+    with pytest.raises(InputError, match=r"its inertia integrals by .*: take the kind 'full'"):  # the surface is there
+        write_fem(away, path, kind="legacy", surface=True)
     with pytest.raises(InputError, match="has no surface to export"):
         write_fem(replace(body, surface=None), path, surface=True)
     with pytest.raises(InputError, match="neither interfaces nor surface points"):

@@ -743,9 +743,22 @@ def test_a_rigid_body_is_a_file_without_modes(tmp_path):
 def test_export_says_what_it_leaves_out(tmp_path, capsys):
     body = replace(cloud(2), stiffening=np.ones((12 + 18, 2, 2)))
     source = save_body(body, tmp_path / "b.ffr")
-    for name, kind, left_out in (("b.SID_FEM", "full", False), ("b.fem", "full", False), ("c.fem", "legacy", True)):
-        main(["export", str(source), "-o", str(tmp_path / name), "--kind", kind, "--surface"])
+    for name, kind, left_out in (
+        ("b.SID_FEM", [], False),
+        ("b.fem", ["--kind", "full"], False),
+        ("c.fem", ["--kind", "legacy"], True),
+    ):
+        main(["export", str(source), "-o", str(tmp_path / name), *kind, "--surface"])
         assert ("geometric stiffness of the body was left out" in capsys.readouterr().out) is left_out
+
+
+@pytest.mark.parametrize(("name", "option"), [("b.SID_FEM", ["--kind", "full"]), ("b.fem", ["--layout", "axis-major"])])
+def test_an_option_of_another_format_is_refused(tmp_path, capsys, name, option):
+    source = save_body(cloud(2), tmp_path / "b.ffr")
+    with pytest.raises(SystemExit) as left:
+        main(["export", str(source), "-o", str(tmp_path / name), *option])
+    assert left.value.code == 2
+    assert f"{option[0]} is for {'MBDyn' if name.endswith('FEM') else 'SID'}" in capsys.readouterr().err
 
 
 def test_export_and_import_commands(tmp_path, capsys):

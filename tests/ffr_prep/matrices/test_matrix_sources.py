@@ -616,18 +616,28 @@ def test_files_that_pynastran_cannot_read(tmp_path):
 
 
 @pytest.mark.parametrize("names", [("run.op2",), ("run.op4", "run.bdf")])
-def test_nastran_without_pynastran(tmp_path, monkeypatch, names):
+@pytest.mark.parametrize(
+    ("raised", "told"),
+    [
+        (ImportError("pyNastran"), r"needs pyNastran, which is not installed: pip install 'ffr\[nastran\]'"),
+        (
+            AttributeError("module 'numpy' has no attribute 'in1d'"),
+            r"pyNastran that is installed does not work with NumPy",
+        ),
+    ],
+)
+def test_nastran_without_a_pynastran_that_works(tmp_path, monkeypatch, names, raised, told):
     real = builtins.__import__
 
     def missing(name, *arguments, **keywords):
         if name.startswith("pyNastran"):
-            raise ImportError(name)
+            raise raised
         return real(name, *arguments, **keywords)
 
     for name in names:
         (tmp_path / name).write_text("")
     monkeypatch.setattr(builtins, "__import__", missing)
-    with pytest.raises(InputError, match=r"needs pyNastran, which is not installed: pip install 'ffr\[nastran\]'"):
+    with pytest.raises(InputError, match=told):
         read_matrices([tmp_path / name for name in names])
 
 

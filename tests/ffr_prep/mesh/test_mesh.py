@@ -419,7 +419,7 @@ def written_by_gmsh(tmp_path_factory):
         gmsh.open(str(MESHES / "box.geo"))
         gmsh.model.mesh.generate(3)
         gmsh.model.mesh.setOrder(1 if kind in ("tet4", "hex8") else 2)
-        for suffix in ("msh", "inp", "bdf", "unv", "med"):
+        for suffix in ("msh", "inp", "bdf", "unv", "med", "mesh"):
             if kind != "hex27" or suffix == "msh":
                 gmsh.write(str(folder / f"{kind}.{suffix}"))
         gmsh.option.setNumber("Mesh.Binary", 1)
@@ -447,10 +447,86 @@ def test_bare_bulk_data_written_by_gmsh(written_by_gmsh, kind):
     assert_is_the_box(read_mesh(written_by_gmsh / f"{kind}.bdf"), kind, "property_1", "property_6")
 
 
+@pytest.mark.parametrize("kind", ["tet4", "tet10", "hex8"])
+def test_medit_written_by_gmsh(written_by_gmsh, kind):
+    assert_is_the_box(read_mesh(written_by_gmsh / f"{kind}.mesh"), kind, "ref_1", "ref_6")
+
+
+# One row of a keyword that mmg writes, counts beside keywords, a version that is no number of meshio's table.
+OF_MMG = "MeshVersionFormatted 3\nDimension 3\n# made by mmg\nRequiredTriangles\n1\n1\n"
+
+
+@pytest.mark.parametrize("kind", ["tet10", "hex27"])
+def test_further_nodes_of_medit_are_taken_by_where_they_lie(kind, tmp_path):
+    """The format leaves their order open (L. Marechal, libMeshb)."""
+    box, ours = box_mesh(kind, tuple(SIZE), CELLS), TABLE[kind]
+    shuffled = [*range(ours.corners), *np.random.default_rng(3).permutation(range(ours.corners, ours.size))]
+    rows = [f"{len(box.points)}", *(f"{x!r} {y!r} {z!r} 0" for x, y, z in box.points.tolist())]
+    cells = [" ".join(map(str, [*(of[shuffled] + 1), 5])) for of in box.blocks[0].nodes]
+    keyword = "TetrahedraP2" if kind == "tet10" else "HexahedraQ2"
+    text = [OF_MMG + "Vertices " + "\n".join(rows), f"{keyword} {len(cells)}", *cells, "End", ""]
+    (tmp_path / "box.mesh").write_text("\n".join(text))
+    mesh = read_mesh(tmp_path / "box.mesh")
+    np.testing.assert_array_equal(mesh.blocks[0].nodes, box.blocks[0].nodes)
+    np.testing.assert_array_equal(mesh.points, box.points)
+    np.testing.assert_array_equal(mesh.volume_groups["ref_5"], np.arange(len(cells)))
+
+
+def test_an_ending_that_nothing_reads_is_named(tmp_path):
+    (tmp_path / "box.key").write_text("*KEYWORD\n")
+    with pytest.raises(InputError, match=r"has an ending that no reader knows: save the mesh as \.msh"):
+        read_mesh(tmp_path / "box.key")
+
+
+def test_a_dat_file_of_ansys_is_no_mesh_without_solids(tmp_path):
+    (tmp_path / "ds.dat").write_text("/batch\n/prep7\nnblock,3\n(1i9,3e20.9e3)\n        1     0.000000000E+000\n-1\n")
+    with pytest.raises(InputError, match=r"ds\.dat: it has no GRID: is it Nastran bulk data\?"):
+        read_mesh(tmp_path / "ds.dat")
+
+
+UNITS = """    -1
+   164
+         5mm (milli-newton)               2
+  {}  1.00000000000000000D+03  1.00000000000000000D+00
+  2.73149999999999977D+02
+    -1
+"""
+
+
+@pytest.mark.parametrize(
+    ("factor", "unit"), [("1.00000000000000000D+03", "mm"), ("3.93700787401574797D+01", "in"), ("1.0D+00", "m")]
+)
+def test_the_unit_that_a_universal_file_declares(written_by_gmsh, tmp_path, factor, unit):
+    """I-deas Test Data Journal, dataset 164: lengths are divided by the first factor to be metres."""
+    plain = written_by_gmsh / "tet10.unv"
+    (tmp_path / "box.unv").write_text(UNITS.format(factor) + plain.read_text())
+    mesh = read_mesh(tmp_path / "box.unv")
+    np.testing.assert_array_equal(mesh.points, read_mesh(plain, unit=unit).points)
+    assert mesh.unit == unit
+    told = [note for note in read_mesh(tmp_path / "box.unv", unit="cm").notes if "which was given" in note]
+    assert len(told) == (unit != "m")  # some programs write metres whatever they have
+
+
 def test_units_are_converted_once(written_by_gmsh):
     metres = read_mesh(written_by_gmsh / "tet4.msh")
     for unit, factor in {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254}.items():
         np.testing.assert_array_equal(read_mesh(written_by_gmsh / "tet4.msh", unit=unit).points, factor * metres.points)
+
+
+@pytest.mark.parametrize("first", ["tetra", "tetra10"])
+def test_elements_of_both_orders_in_one_volume_are_refused(tmp_path, first):
+    """Gmsh gives the nodes of all as those of the first: the corners alone, or zeros for those that there are not."""
+    box = box_mesh("tet10", tuple(SIZE), CELLS)
+    half = len(box.blocks[0].nodes) // 2
+    cells = {"tetra": box.blocks[0].nodes[:half, :4], "tetra10": box.blocks[0].nodes[half:]}
+    mixed = [(first, cells.pop(first)), *cells.items()]
+    tagged = [np.ones(len(nodes), int) for _, nodes in mixed]
+    given = {"gmsh:physical": tagged, "gmsh:geometrical": tagged}
+    meshio.Mesh(box.points, mixed, cell_data=given).write(tmp_path / "box.msh", file_format="gmsh22")
+    with pytest.raises(
+        InputError, match=r"box\.msh: a volume has elements of first and of second order beside each other"
+    ):
+        read_mesh(tmp_path / "box.msh")
 
 
 def test_wedges_are_refused(tmp_path):
@@ -656,7 +732,8 @@ def test_abaqus_includes(deck, tmp_path):
         ("9, 0., 0., 2.", "8, 0., 0., 2.", "node 8 is defined twice"),
         ("20, 5, 6, 7, 8,", "10, 5, 6, 7, 8,", "element 10 is defined twice"),
         ("C3D8I", "C3D15", "volume elements of kind 'C3D15'"),
-        ("*Mass, elset=Both", "*Instance, name=a, part=p\n1., 0., 0.", "assembly"),
+        ("*Mass, elset=Both", "*Instance, name=a, part=p\n*End Instance\n*Instance, name=b, part=p", "assembly"),
+        ("*Mass, elset=Both", "*Instance, name=a, part=p\n1., 0., 0.\n0, 0, 1, 0, 0, 1, 90.", "two points are one"),
         ("*Mass, elset=Both", "*Include, input=nowhere.inp", "nowhere.inp does not exist"),
         ("6, 1., 0., 1.", "6, 1., zero, 1.", "cannot read .*cube.inp as an Abaqus input file"),
     ],
@@ -712,6 +789,44 @@ def test_abaqus_reference_points_of_an_assembly_are_no_nodes_of_its_part(deck):
     assert mesh.node_groups.keys() - plain.node_groups.keys() == {"Four"}
     assert mesh.volume_groups.keys() == plain.volume_groups.keys()
     assert mesh.notes[1].startswith("2 nodes of the assembly left out: reference points are those of interfaces")
+
+
+def test_the_place_of_the_one_instance_is_that_of_the_mesh(deck):
+    """Abaqus Keywords Reference Guide, *INSTANCE: shifted first, then turned about a line through two points [deg]."""
+    placed = "*Instance, name=cube-1, part=cube\n0.5, , 2.\n0.5, 0., 0., 0.5, 0., 4., 90.\n*End Instance\n"
+    plain, mesh = read_mesh(deck()), read_mesh(deck(DECK + placed))
+    x, y, z = plain.points.T
+    np.testing.assert_allclose(mesh.points, np.stack([0.5 - y, x, z + 2], axis=1), atol=1e-15)
+    assert mesh.node_groups.keys() == plain.node_groups.keys()
+
+
+def test_abaqus_keywords_behind_blanks_and_parameters_of_the_next_line(deck):
+    """Abaqus Keywords Reference Guide: the first character of a keyword line that is not blank is the star."""
+    mesh = read_mesh(deck(DECK.replace("*Element", "  *Element") + "*Nset, nset=Some,\n  generate\n1, 3\n"))
+    assert mesh.volume_groups.keys() == read_mesh(deck()).volume_groups.keys()
+    np.testing.assert_array_equal(mesh.node_groups["Some"], range(3))
+
+
+def test_a_set_with_a_point_in_its_name_is_no_number_of_an_instance(deck):
+    """It was element 10 of an instance "near": the other end of the cubes."""
+    sets = "*Elset, elset=near.10\n20\n*Surface, name=There\nnear.10, S2\n"
+    mesh = read_mesh(deck(DECK + sets))
+    np.testing.assert_array_equal(mesh.points[region_nodes(mesh, "There")][:, 2], 2.0)
+
+
+def test_abaqus_order_of_hexahedra_with_27_nodes(deck):
+    """Abaqus, Three-dimensional solid element library: node 21 in the middle, 22 to 27 on the faces S1 to S6."""
+    box, faces = box_mesh("hex27", tuple(SIZE), (1, 1, 1)), (1, 2, 3, 4, 5, 6)
+    corners, middle = box.points[box.blocks[0].nodes[0][:8]], box.blocks[0].nodes[0][20:]
+    sides = [(0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0)]
+    places = [corners.mean(axis=0), *(corners[list(sides[k - 1])].mean(axis=0) for k in faces)]
+    order = [int(np.linalg.norm(box.points[middle] - at, axis=1).argmin()) for at in places]
+    element = [1, *(box.blocks[0].nodes[0][:20] + 1), *(middle[order] + 1)]
+    nodes = [f"{k}, {x!r}, {y!r}, {z!r}" for k, (x, y, z) in enumerate(box.points.tolist(), 1)]
+    text = "\n".join(["*NODE", *nodes, "*ELEMENT, TYPE=C3D27", ", ".join(map(str, element)), ""])
+    mesh = read_mesh(deck(text))
+    check_mesh(mesh)
+    assert_nodes_in_order(mesh)
 
 
 def test_abaqus_node_sets_of_element_sets(deck):

@@ -164,6 +164,22 @@ def test_reductions(tmp_path, text, expected):
     assert read_structure(written(tmp_path, f"reduction = {text}" + LINE)).request.reduction == expected
 
 
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("{moments = 7}", "moments is a setting of krylov, and not of craig-bampton"),
+        (
+            '[{method = "krylov", modes = 3}, {modes = 4}]',
+            "modes says which normal modes to keep, and krylov keeps none",
+        ),
+        ('{method = "rubin", interface_modes = 3}', "take the method characteristic"),
+    ],
+)
+def test_what_a_reduction_has_no_use_for_is_refused(tmp_path, text, message):
+    with pytest.raises(InputError, match=message):
+        read_structure(written(tmp_path, f"reduction = {text}" + LINE))
+
+
 def test_the_quality_of_a_structure_is_reported(tmp_path):
     text = "reduction = {modes = 2}\nquality = [5, 200]\n" + LINE.replace("elements = 2", "elements = 8")
     body = body_of(written(tmp_path, text))

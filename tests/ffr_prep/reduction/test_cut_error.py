@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -97,7 +98,7 @@ def test_stress_beside_a_cut_is_told_of_solids_alone():
     model = from_mesh(mesh, STEEL, [InterfaceRegion("left"), InterfaceRegion("right")])
     request = Request(name="bar", reference=FixedTo("left"), reduction=CraigBampton(0), stress=True, linear=True)
     body = reduce(model, replace(request, parts=2))
-    assert "up to a third off" in body.provenance["warnings"][-1]
+    assert "up to a half off" in body.provenance["warnings"][-1]
     first = body.parts[0]
     tension = first.surface.stress @ (first.interface("cut_1_a").phi_t[0] * 0.0024 / first.omega2)
     cut = np.isclose(first.surface.points[:, 0], 0.5)
@@ -105,6 +106,26 @@ def test_stress_beside_a_cut_is_told_of_solids_alone():
     middle = np.isclose(first.surface.points[:, 0], 0.25)
     np.testing.assert_allclose(von_mises(tension[middle]), 1.0, atol=0.02)
     assert not about_cuts(in_parts(rod(), 2, stress=True))
+
+
+@pytest.mark.parametrize(("normal", "stepped"), [((1.0, 0.0, 0.0), False), ((1.0, 2.0, 0.0), True)])
+def test_stress_at_a_cut_without_a_plane_of_faces_is_told_to_be_none(normal, stepped):
+    """Under one pascal of tension the elements that a stepped cut holds as a whole have none; a plane one leaves half. The
+    plane that is asked for goes through 0.12 m of the length."""
+    mesh = box_mesh("tet10", (0.24, 0.06, 0.04), (10, 3, 1))
+    model = from_mesh(mesh, STEEL, [InterfaceRegion("left"), InterfaceRegion("right")])
+    request = Request(name="bar", reference=FixedTo("left"), reduction=CraigBampton(0), stress=True, linear=True)
+    body = reduce(model, replace(request, parts=[CutPlane((0.121, 0.02, 0.02), normal)]))
+    first, warning = body.parts[0], body.provenance["warnings"][-1]
+    tension = von_mises(first.surface.stress @ (first.interface("cut_1_a").phi_t[0] * 0.0024 / first.omega2))
+    found = re.search(r"and next to none .* deep are the cuts 1 \(([\d.]+) m\)", warning)
+    assert bool(found) == stepped
+    if found:
+        assert 0.06 < float(found[1]) < 0.12 + 2 * 0.024
+        assert tension.min() < 1e-9
+    else:
+        assert "up to a half off" in warning
+        assert tension.min() > 0.5
 
 
 def test_bodies_of_hardly_any_shapes():

@@ -391,6 +391,13 @@ def test_fields_of_ones_own(tmp_path, capsys):
         (["--frequency", 100, "--accuracy", "1,2,3"], "both say how many modes"),
         (["--method", "inertia-relief", "--accuracy", "1,2,3"], "accuracy says which normal modes to keep"),
         (["--method", "inertia-relief", "--modes", 3], "leave it out, or add the method craig-bampton"),
+        (["--moments", 3], "moments is a setting of krylov, and not of craig-bampton: leave it out"),
+        (
+            ["--method", "guyan", "--method", "rubin", "--match", "5"],
+            "match is a setting of krylov, and not of guyan and",
+        ),
+        (["--interface-modes", 3], "leave it out, or take the method characteristic"),
+        (["--linear", "--drawn-modes", 3], "drawn_modes says which modes foreshorten what is drawn, and linear"),
         (["--accuracy", "1,2"], "3 numbers with commas"),
         (["--accuracy", "a,b,c"], "write numbers with commas"),
         (["--frequency", -1], "must be positive"),

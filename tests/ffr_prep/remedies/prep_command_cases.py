@@ -36,6 +36,7 @@ OPTIONS = [
     words("modes body.ffr --modes x -o out", "modes body.ffr --modes 1-1 -o out"),
     words("modes body.ffr --modes 9 -o out", "info body.ffr"),
     words("rigid part.geo -o new.ffr", "rigid part.geo --density 7850 -o new.ffr"),
+    words("rigid part.geo --material ALL=steel -o new.ffr", "rigid part.geo --material steel -o new.ffr"),
     reduces("--set a --mesher-timeout 9", "--mesher-timeout 9"),
     words("mesh part.geo --set w", "mesh part.geo --size 1 --order 1 --set w=0.2"),
     words("mesh part.geo --set w=wide", "mesh part.geo --size 1 --order 1 --set w=2e-1"),
@@ -55,6 +56,7 @@ OPTIONS = [
     reduces("--accuracy 10;20;3", "--modes 2"),
     reduces("--accuracy 10,20", "--frequency 2000"),
     reduces("--method guyan --modes 2", "--method guyan --method craig-bampton --modes 2"),
+    reduces("--moments 1", "--method krylov --moments 1"),
     words("reduce block.inp --interface LEFT -o scene.toml", REDUCE),
     words(
         "reduce part.geo --interface surface_1 -o new.ffr",
@@ -222,6 +224,7 @@ FILES = [
     ),
     words("import block.inp -o new.ffr", "import legacy.fem -o new.ffr"),
     words("export body.ffr -o new.xyz", "export body.ffr -o new.sid"),
+    words("export body.ffr -o new.sid --kind full", "export body.ffr -o new.fem --kind full"),
     words("info body.ffr --terms I10", "info body.ffr --terms I1"),
     reduces("--stiffening", "--linear"),
     words("reduce block.inp --linear --interface LEFT -o -", REDUCE),

@@ -108,7 +108,8 @@ DECKS = [
     of("block.inp", ("C3D8, ELSET=ALL\n1, 1,", "C3D8, ELSET=ALL\n1, 99,")),
     of("block.inp", ("C3D8, ELSET=ALL\n1, 1,", "C3D8, ELSET=ALL\n2, 1,")),
     of("block.inp", ("*NODE", "*INCLUDE, INPUT=block.inp\n*NODE")),
-    of("block.inp", ("*NODE", "*INSTANCE, NAME=a, PART=p\n1., 0., 0.\n*NODE")),
+    of("block.inp", ("*NODE", "*INSTANCE, NAME=a, PART=p\n*INSTANCE, NAME=b, PART=p\n*NODE")),
+    of("block.inp", ("*NODE", "*INSTANCE, NAME=a, PART=p\n1., 0., 0.\n0, 0, 0, 0, 0, 0, 90.\n*NODE")),
     of("block.inp", ("TYPE=C3D8", "TYPE=C3D6")),
     of("block.inp", ("TYPE=C3D8", "TYPE=B31")),
     rewritten(
@@ -118,6 +119,7 @@ DECKS = [
         (),
     ),
     of("fields.bdf", ("GRID,4,", "GRID,x,")),
+    rewritten(read_mesh, "fields.bdf", (("", "/batch\n"),), ()),
     of("fields.bdf", ("GRID,4,", "=,4,")),
     of("fields.bdf", ("1.+0\n", "1.+0,,,,9\n")),
     of("fields.bdf", ("BEGIN BULK\n", "BEGIN BULK\nGRID,90,,0.,0.,5.,,,,+A\n+B,7\n")),
@@ -133,16 +135,24 @@ DECKS = [
     of("mesh.frd", (FRD_HEAD, FRD_HEAD[:-1] + "2")),
     of("mesh.frd", (" -1         1    3", " -1         1    2")),
     of("mesh.vtu", ("VTKFile", "VTK")),
+    of("mesh.mesh", ("MeshVersionFormatted", "Formatted")),
+    of("mesh.mesh", ("Dimension 3", "Dimension 2"), ("Vertices", "Vertex")),
+    of("mesh.mesh", ("Dimension 3", "Dimension three")),
+    of("mesh.mesh", ("Dimension 3", "Dimension 3000000000000000")),
+    of("mesh.mesh", ("\nVertices\n", "\nVertices\n1")),
+    of("mesh.mesh", ("\nTetrahedra\n6\n1", "\nTetrahedra\n6\n99")),
 ]  # fmt: skip
 NINE = (
     "*ELASTIC\n2.1e11, 0.3",
     "*ELASTIC, TYPE=ENGINEERING CONSTANTS\n1.2e10, 8e8, 5e8, .4, .3, .3, 7e8, 7e8\n8e7",
 )
+TURNED = "*INSTANCE, NAME=a, PART=p\n0., 0., 0.\n0, 0, 0, 0, 0, 1, 90.\n"
 MATERIALS = [
     edited(materials, "block.inp", ("MATERIAL=STEEL", "MATERIAL=BRASS")),
     edited(materials, "block.inp", ("2.1e11", "2.1e5")),
     edited(materials, "block.inp", ("*DENSITY\n7850.\n", "")),
     edited(materials, "block.inp", ("SECTION, ELSET", "SECTION, ORIENTATION=o, ELSET"), NINE),
+    edited(materials, "block.inp", ("*NODE", f"{TURNED}*NODE"), NINE),
     edited(materials, "block.inp", ("*ELASTIC", "*ELASTIC, TYPE=LAMINA")),
     edited(materials, "block.inp", ("2.1e11", "stiff")),
     edited(materials, "block.inp", ("*DENSITY\n7850.\n", "*DENSITY\n7850.\n*DENSITY\n7800.\n")),
@@ -251,11 +261,11 @@ SOLIDS = replace(
 )
 
 
-def medit(dimension: int = 3, last: int = 4) -> object:
+def su2(dimension: int = 3, last: int = 3) -> object:
     """A tetrahedron in a file of another program that meshio reads."""
-    corners = "\n".join(" ".join([*place[:dimension], "1"]) for place in ("000", "100", "010", "001"))
-    head = f"MeshVersionFormatted 2\nDimension\n{dimension}\nVertices\n4\n{corners}\n"
-    return with_files(lambda: read_mesh("a.mesh"), {"a.mesh": (("", f"{head}Tetrahedra\n1\n1 2 3 {last} 1\nEnd\n"),)})
+    corners = "\n".join(" ".join(place[:dimension]) for place in ("000", "100", "010", "001"))
+    text = f"NDIME= {dimension}\nNELEM= 1\n10 0 1 2 {last}\nNPOIN= 4\n{corners}\nNMARK= 0\n"
+    return with_files(lambda: read_mesh("a.su2"), {"a.su2": (("", text),)})
 
 
 def stepped(query: str) -> object:
@@ -275,8 +285,8 @@ FAILURES = [
     Case(p(_check_geometry, STEP, "m", {}), p(_check_geometry, STEP, None, {})),
     Case(p(check_mesh, SOLIDS), p(check_mesh, PLAIN)),
     of("block.inp", ("1, 0.0", "1, 1e40")),
-    Case(p(medit, 2), medit),
-    Case(p(medit, last=9), medit),
+    Case(p(su2, 2), su2),
+    Case(p(su2, last=9), su2),
     Case(p(stepped, "plane normal=0,1,0"), p(stepped, "all plane normal=0,1,0")),
     Case(p(face_group, PLAIN, "lid"), p(face_group, PLAIN, "top")),
 ]

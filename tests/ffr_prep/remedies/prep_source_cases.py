@@ -95,6 +95,7 @@ NASTRAN = [
     Case(p(op2, 2), op2),
     Case(p(without_pynastran, "a.op2", ImportError("pyNastran")), NPZ),
     Case(p(without_pynastran, "a.op2", ValueError("no header")), NPZ),
+    Case(p(without_pynastran, "a.op2", AttributeError("module 'numpy' has no attribute 'in1d'")), NPZ),
 ]
 
 # ---- scikit-fem ------------------------------------------------------------------------------------------------------
