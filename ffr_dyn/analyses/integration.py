@@ -23,10 +23,10 @@ from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.compile.workspace import new_record
 from ffr_dyn.consistency import failure as failing
 from ffr_dyn.consistency.assemble import BRANCHES, Assembled, assemble
-from ffr_dyn.consistency.doubts import BALANCE, SINGULAR, Seen, between_rows, ended, held, look, nothing_seen
+from ffr_dyn.consistency.doubts import BALANCE, SINGULAR, SUDDEN, Seen, between_rows, ended, held, look, nothing_seen
 from ffr_dyn.consistency.evaluation import joined
 from ffr_dyn.consistency.explicit_forces import told
-from ffr_dyn.consistency.following import LOST, STALLED, Lost, jumped, lost_driver, unfollowed
+from ffr_dyn.consistency.following import LOST, STALLED, Lost, jumped, lost_driver, sudden, unfollowed
 from ffr_dyn.consistency.step_error import ENDED_BY
 from ffr_dyn.consistency.validity import meaningless
 from ffr_dyn.functions.stopwatch import Stopwatch
@@ -140,7 +140,7 @@ def integrate(
                 writer.append(times, {name: quantity.values for name, quantity in part.items()}, _checkpoint(run, mark))
             if progress is not None:
                 progress(float(times[-1]))
-        account = _account(run, header["notes"]) | ({} if watcher is None else _passed(watcher))
+        account = _account(run, header["notes"], fast) | ({} if watcher is None else _passed(watcher))
         if writer is not None:
             writer.close("complete", header | account)
     return _result(scene, run, header | account | {"status": "complete"})
@@ -590,10 +590,11 @@ def _result(scene: Scene, run: _Run, attributes: dict[str, Any]) -> Result:
     return Result(np.concatenate(run.kept.times), run.kept.quantities(), geometry(scene), attributes)
 
 
-def _account(run: _Run, notes: list[str]) -> dict[str, Any]:
+def _account(run: _Run, notes: list[str], fast: Fast | None) -> dict[str, Any]:
     """The attributes that only the end of a run can tell."""
     assembled = run.seen.assembled
     info, drift = run.engine.work.info, run.engine.work.drift
+    span = float(run.kept.times[0][0]), float(run.kept.times[-1][-1])
     return {
         "evaluations": int(info[EVALUATIONS]),
         "projections": int(info[PROJECTIONS]),
@@ -611,6 +612,7 @@ def _account(run: _Run, notes: list[str]) -> dict[str, Any]:
                     SINGULAR: passed_in_words(
                         assembled.system, assembled.all_rows, run.engine.work, run.energy.spacing
                     ),
+                    SUDDEN: sudden(assembled.system, np.zeros(0) if fast is None else fast.moments, *span),
                     BALANCE: run.energy.amiss(),
                     **between_rows(run.seen, run.engine.system, run.engine.work),
                 },

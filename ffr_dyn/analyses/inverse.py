@@ -20,7 +20,7 @@ from ffr_dyn.analyses.registry import OverTime, option
 from ffr_dyn.analyses.settings import Settings
 from ffr_dyn.analyses.trials.begin import Beginning
 from ffr_dyn.consistency.assemble import Assembled, assemble, flattened
-from ffr_dyn.consistency.doubts import checked
+from ffr_dyn.consistency.doubts import SUDDEN, checked
 from ffr_dyn.consistency.evaluation import Evaluator, copied, evaluate, evaluator, joined, locked
 from ffr_dyn.consistency.mobility import require_driven, undeformed
 from ffr_dyn.equations.layout import moved, to_global_axes, velocity_sizes
@@ -158,7 +158,7 @@ def _quasi_static(
         "evaluations": int(at.work.info[EVALUATIONS]),
         "degrees_of_freedom": assembled.degrees_of_freedom,
         "computed": assembled.computed,
-        "notes": [*assembled.notes, *checked("inverse", assembled, record)],
+        "notes": [*assembled.notes, *checked("inverse", assembled, record, {SUDDEN: rigid.sudden})],
         "status": "complete",
     }
     return result_of(assembled.system, record, attributes, path, outputs, rigid.angles)

@@ -56,6 +56,7 @@ TABLE: dict[str, dict[str, str]] = {
     "mechanism come apart": _verdicts(ERROR, NOTE, ERROR, ERROR, ERROR),
     "driver not followed": _verdicts(ERROR, NOTE, ERROR, ERROR, ERROR),
     "driver faster than the step": _verdicts(NOTE, NOTE, NONE, NONE, NONE),
+    "driven motion that jumps": _verdicts(NOTE, NONE, NOTE, NONE, NONE),
     "energy multiplied": _verdicts(ERROR, NONE, NONE, NONE, NONE),  # at once, by `ffr_dyn.analyses.energy`
     "energy come or gone": _verdicts(NOTE, NONE, NONE, NONE, NONE),
     "force too stiff for the step": _verdicts(NOTE, NOTE, NONE, NONE, NONE),
@@ -67,7 +68,7 @@ TABLE: dict[str, dict[str, str]] = {
     "mass matrix nearly singular": _verdicts(NOTE, NOTE, NONE, NOTE, NOTE),
     "kink of a force": _verdicts(NONE, NONE, NONE, NONE, NONE) | {"linearise": NOTE},
 }
-OPEN, APART, ASTRAY, QUICK, _, BALANCE, STIFF, WOUND, STRAINED, MEANINGLESS, SPUN, SINGULAR, MASS, KINK = TABLE
+OPEN, APART, ASTRAY, QUICK, SUDDEN, _, BALANCE, STIFF, WOUND, STRAINED, MEANINGLESS, SPUN, SINGULAR, MASS, KINK = TABLE
 
 MET = 1e-8  # m, -: of constraints that Newton's method closes
 KEPT = 10.0  # times the tolerance of a projection
@@ -232,7 +233,8 @@ def ended(analysis: str, seen: Seen, more: Mapping[str, Sequence[str]] | None = 
     for doubt in (doubt for doubt, verdicts in TABLE.items() if verdicts[analysis] == ERROR):
         for text in found.get(doubt, ()):
             raise ComputationError(text)
-    return [text for doubt, verdicts in TABLE.items() if verdicts[analysis] == NOTE for text in found.get(doubt, ())]
+    noted = [doubt for doubt, verdicts in TABLE.items() if verdicts[analysis] == NOTE]
+    return list(dict.fromkeys(text for doubt in noted for text in found.get(doubt, ())))
 
 
 def _found(seen: Seen) -> dict[str, list[str]]:

@@ -3,6 +3,8 @@ start that many motions leave."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -33,6 +35,60 @@ def test_a_small_jump_of_a_driver_is_told_as_a_jump(size):
     ):
         result = fd.forward(scene, end=1.0, output_step=0.01, method=fd.ROS2(1e-3))
         assert any(f"driver 'd' jumps by {size:g} m at t = 0.5 s" in note for note in result.attributes["notes"])
+
+
+ANALYSES = {
+    "forward": lambda scene, **of: fd.forward(scene, method=fd.ROS2(2e-3), check=False, **of),
+    "inverse": lambda scene, **of: fd.inverse(scene, elastic=fd.Dynamic(fd.ROS2(2e-3)), **of),
+    "quasi-static": lambda scene, **of: fd.inverse(scene, elastic=fd.QuasiStatic(), **of),
+    "kinematic": fd.kinematic,
+}
+CORNERS = {
+    "formula": (fd.formula("0.2 * min(t, 0.505)"), -0.2, 0.505),
+    "turned back": (fd.formula("0.1 * abs(0.3 - t)"), 0.2, 0.3),
+    "pieces": (fd.piecewise(np.array([0, 0.3, 1.0]), np.array([[0.0, 0.1], [0.03, 0.3]])), 0.2, 0.3),
+    "table that ends": (fd.table(np.array([0, 0.2, 0.4, 0.6]), np.array([0, 0.04, 0.08, 0.12])), -0.2, 0.6),
+    "Python": (fd.user(lambda t: (0.2 * max(t, 0.3), 0.2 * (t >= 0.3), 0.0), breaks=[0.3]), 0.2, 0.3),
+}
+
+
+@pytest.mark.parametrize("analysis", ANALYSES)
+@pytest.mark.parametrize("corner", CORNERS)
+def test_the_impulse_of_a_driver_that_changes_its_rate_is_told(corner, analysis):
+    """m Δv = 1 kg 0.2 m/s at once: velocities have it, and no force at a row."""
+    function, change, at = CORNERS[corner]
+    scene = sliding(float(function.callback(0.0)[0]) if function.callback else 0.0)
+    driven = replace(scene, drivers=(fd.Driver("d", "guide", function, coordinate="stroke"),))
+    result = ANALYSES[analysis](driven, end=0.9, output_step=0.01)
+    told = f"driver 'd' changes its rate by {change:.4g} m/s at once at t = {at:g} s: that takes an impulse"
+    assert len([note for note in result.attributes["notes"] if told in note]) == 1
+    velocity, row = result["block.v"][:, 0], int(at / 0.01)
+    assert velocity[row + 2] - velocity[row - 2] == pytest.approx(change, rel=1e-6)
+    assert abs(result["d.force"]).max() < 1e-6
+
+
+@pytest.mark.parametrize("analysis", ANALYSES)
+def test_driven_motions_without_a_corner_are_told_no_impulse(analysis):
+    """Nor those that begin and end on their way, or have a corner before or after the run."""
+    times = np.linspace(0, 0.6, 25)
+    for function in (
+        fd.formula("0.2 * 0.1 * ramp(t / 0.1) + 0.01 * sin(9 * t)"),
+        fd.table(times, 0.02 * np.sin(np.pi * times / 1.2) ** 4),  # from rest to rest
+        fd.formula("0.2 * min(t, 1.2) + 0.1 * abs(t + 1)"),
+        fd.table(np.array([0, 0.3, 0.9]), np.array([0, 0.1, 0.3])),
+    ):
+        driven = sliding(drivers=(fd.Driver("d", "guide", function, coordinate="stroke"),))
+        result = ANALYSES[analysis](driven, end=0.9, output_step=0.01)
+        assert not [note for note in result.attributes["notes"] if "impulse" in note]
+
+
+def test_a_step_that_begins_at_a_corner_has_the_rate_behind_it():
+    """Rates of both operands differ where they are equal, which is a time at which steps begin, with others about it that
+    a note on fast changes asked for: the driver was off by its whole motion within such a step."""
+    driven = sliding(drivers=(fd.Driver("d", "guide", fd.formula("min(t, 0.3)"), coordinate="stroke"),))
+    result = fd.forward(driven, end=0.7, output_step=0.1, method=fd.ROS2(2.5e-3), check=False)
+    assert not [note for note in result.attributes["notes"] if "is open by" in note or "changes within" in note]
+    assert result.attributes["largest_drift"][0] < 1e-12
 
 
 @pytest.mark.parametrize("size", [0.15, 0.2, 0.3, 0.5, 2.0])
