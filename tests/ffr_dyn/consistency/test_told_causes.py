@@ -143,3 +143,62 @@ def test_a_net_that_is_lost_at_its_flat_start_is_told_so():
         fd.ComputationError, match=r"no longer finite: the scene starts in a singular position.* draw it a"
     ):
         fd.forward(scene, end=0.01, output_step=0.01, method=fd.ROS2(1e-4))
+
+
+WHEEL = """
+[analysis]
+end = 1.5
+output_step = 0.01
+step = 1e-3
+check = false
+[ground]
+o = [0, 0, 0]
+[bodies.wheel]
+mass = 1.0
+inertia = [0.1, 0.1, 0.1]
+points = {hub = [0, 0, 0]}
+[joints.axle]
+kind = "revolute"
+i = "ground.o"
+j = "wheel.hub"
+[forces.motor]
+kind = "actuator"
+joint = "axle"
+"""
+FOLLOWING = "max(min(5 * (4 * t - axle.angle) + 0.5 * (4 - axle.angle_rate), 2), -2)"
+
+
+def wheel(tmp_path, force: str):
+    (tmp_path / "wheel.toml").write_text(f'{WHEEL}force = "{force}"\n', encoding="utf-8")
+    return fd.load_scene(tmp_path / "wheel.toml")
+
+
+def test_a_formula_that_jumps_where_a_joint_passes_half_a_turn_is_told(tmp_path):
+    """A controller by a formula of the angle runs away there, where a servo with the same numbers goes on."""
+    scene, settings = wheel(tmp_path, FOLLOWING)
+    servo = fd.Servo("motor", "axle", fd.formula("4 * t"), kp=5.0, kd=0.5, limit=2.0)
+    found, meant = (fd.run(one, settings) for one in (scene, replace(scene, forces=(servo,))))
+    row = int(np.argmax(meant["axle.angle"] > np.pi))
+    np.testing.assert_allclose(found["axle.angle"][:row], meant["axle.angle"][:row], atol=1e-3)
+    assert found["axle.angle"][-1] > meant["axle.angle"][-1] + 3.0
+    (told,) = [note for note in found.attributes["notes"] if "half a turn" in note]
+    assert told.startswith("force 'motor': its formula reads axle.angle")
+    assert f"at t = {found.time[row]:g} s; use a servo" in told
+    assert not [note for note in meant.attributes["notes"] if "half a turn" in note]
+    stepper = fd.Stepper(scene, fd.ROS2(1e-3))
+    for _ in range(150):
+        stepper.step(10)
+        told_by_stepper = [note for note in stepper.doubts() if "half a turn" in note]
+    assert told_by_stepper == [told]
+
+
+TURNING = ("2 + 0.5 * sin(axle.angle) + cos(3 * axle.angle)", "3 - 0.1 * axle.angle_rate")
+
+
+@pytest.mark.parametrize("force", [*TURNING, "0.2 * axle.angle + 0.1"])
+def test_formulas_that_do_not_jump_are_told_nothing(force, tmp_path):
+    """Those of period one turn, those without the angle, and an angle that does not come so far."""
+    scene, settings = wheel(tmp_path, force)
+    result = fd.run(scene, settings)
+    assert (result["axle.angle"][-1] > 2 * np.pi) == (force in TURNING)
+    assert not [note for note in result.attributes["notes"] if "half a turn" in note]
