@@ -612,7 +612,7 @@ def _account(run: _Run, notes: list[str], fast: Fast | None) -> dict[str, Any]:
                     SINGULAR: passed_in_words(
                         assembled.system, assembled.all_rows, run.engine.work, run.energy.spacing
                     ),
-                    SUDDEN: sudden(assembled.system, np.zeros(0) if fast is None else fast.moments, *span),
+                    SUDDEN: sudden(assembled.system, np.zeros(0) if fast is None else fast.breaks, *span),
                     BALANCE: run.energy.amiss(),
                     **between_rows(run.seen, run.engine.system, run.engine.work),
                 },

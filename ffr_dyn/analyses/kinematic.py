@@ -20,7 +20,7 @@ from ffr_dyn.analyses.outcome import needed, output_times, result_of, turned_alo
 from ffr_dyn.analyses.registry import OverTime
 from ffr_dyn.analyses.settings import Settings
 from ffr_dyn.closing.limits import with_limits
-from ffr_dyn.compile.divided_steps import moments_of
+from ffr_dyn.compile.divided_steps import breaks_of
 from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.consistency import doubts
 from ffr_dyn.consistency.assemble import Assembled, assemble
@@ -141,7 +141,7 @@ def along_the_path(
     require_driven(rigid, start, "a kinematic analysis")
     assembled = assemble(rigid, time=start)
     selected(assembled.system, needed(scene, outputs))
-    moments = moments_of(assembled.system, start, end, output_step)
+    breaks = breaks_of(assembled.system, start, end, output_step)
     at = evaluator(assembled.all_rows or assembled.system)
     pose = replace(
         _pose(at, start, assembled.x, assembled.v), v=to_body_axes(at.system.layout, assembled.x, assembled.v)
@@ -153,7 +153,7 @@ def along_the_path(
         if progress is not None:
             progress(float(time))
     record, angles = _recorded(assembled, followed, rows)
-    notes, at_once = [*assembled.notes, *_undeformed_notes(scene)], sudden(assembled.system, moments, start, end)
+    notes, at_once = [*assembled.notes, *_undeformed_notes(scene)], sudden(assembled.system, breaks, start, end)
     found = {doubts.SINGULAR: _singular_notes(at.system, followed), doubts.SUDDEN: at_once}
     notes += doubts.checked("kinematic", assembled, record, found)
     return Followed(assembled, record, angles, notes, at_once, int(at.work.info[EVALUATIONS]))

@@ -37,7 +37,7 @@ from ffr_dyn.analyses.outcome import (
 )
 from ffr_dyn.analyses.registry import OverTime, option
 from ffr_dyn.analyses.settings import Settings
-from ffr_dyn.compile.divided_steps import moments_of
+from ffr_dyn.compile.divided_steps import breaks_of
 from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.consistency.assemble import Assembled, assemble, flattened
 from ffr_dyn.consistency.doubts import SUDDEN, checked
@@ -270,7 +270,7 @@ def _not_collocated(
         other = _integrated(own, finer, times, w, assembled.x, None) if own.size else None
         differ = FINER ** (-1 / ORDER), ORDER
     record, system = _recorded(whole, times, found), whole.free.system
-    at_once = sudden(assembled.system, moments_of(assembled.system, start, end, output_step), start, end)
+    at_once = sudden(assembled.system, breaks_of(assembled.system, start, end, output_step), start, end)
     doubted = checked("mixed", replace(assembled, system=system, all_rows=None), record, {SUDDEN: at_once})
     attributes: dict[str, Any] = {
         **described(scene),

@@ -7,6 +7,7 @@ asked for, however well the joints are closed at their ends.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -89,14 +90,16 @@ def jumped(system: System, times: Array) -> str:
     return ""
 
 
-def sudden(system: System, moments: Array, start: float, end: float) -> list[str]:
+def sudden(system: System, breaks: Array, start: float, end: float) -> list[str]:
     """Which drivers and lengths jump between two times [s], or change their rates at once, in words.
 
-    moments : (K,) [s] at which functions of time may switch, beside those that they tell
+    breaks : (K,) [s] at which functions of time jump or switch, beside those that they tell
     """
     aside = BESIDE * (end - start)
-    times = np.concatenate([system.model.functions.breaks[:, UNTIL], moments])
+    times = np.concatenate([system.model.functions.breaks[:, UNTIL], breaks])
     times = np.unique(times[(times > start + aside) & (times < end - aside)])
+    if not times.size:
+        return []
     said = [(block, word) for block in system.blocks for word in block.words if word.function is not None]
     return [text for block, word in said for text in _broken(block, word, times, np.linspace(start, end, LOOKS))]
 
@@ -104,13 +107,13 @@ def sudden(system: System, moments: Array, start: float, end: float) -> list[str
 def _broken(block: Block, word: Word, times: Array, looks: Array) -> Iterator[str]:
     """What a driven motion does at once at any of the times [s]; looks : (L,) from the first time to the last."""
     aside = BESIDE * float(looks[-1] - looks[0])
-    before, behind = (
-        np.array([drive_of(word, float(t)) for t in times + side]).reshape(-1, 3) for side in (-aside, aside)
-    )
-    value, rate, _ = np.concatenate([before, behind, [drive_of(word, float(t)) for t in looks]]).T
-    fastest = float(np.abs(rate).max())
+    before, behind = (_prescribed(word, times + side) for side in (-aside, aside))
+    value, rate = np.concatenate([before, behind, _prescribed(word, looks)]).T
+    fastest = float(np.nanmax(np.abs(rate), initial=0.0))
     jumps = behind[:, 0] - before[:, 0] - aside * (behind[:, 1] + before[:, 1])
-    for k in np.flatnonzero(np.abs(jumps) > STEADY * (np.ptp(value) + aside * fastest)).tolist()[:1]:
+    for k in np.flatnonzero(np.abs(jumps) > STEADY * (np.nanmax(value) - np.nanmin(value) + aside * fastest)).tolist()[
+        :1
+    ]:
         yield _told_jump(block, word, float(times[k]), float(jumps[k]))
     changes = behind[:, 1] - before[:, 1]
     at_once = np.flatnonzero(np.abs(changes) > AT_ONCE * fastest)
@@ -122,6 +125,15 @@ def _broken(block: Block, word: Word, times: Array, looks: Array) -> Iterator[st
             "that takes an impulse, which no force, effort, power or work of the result holds; round the corner, as `smooth` "
             "and `ramp` do, or let a table go on"
         )
+
+
+def _prescribed(word: Word, times: Array) -> Array:
+    """(T, 2) value and rate of a driven motion, NaN where it has none: no step needs to have been there."""
+    found = np.full((times.size, 2), np.nan)
+    for k, t in enumerate(times.tolist()):
+        with suppress(Exception):
+            found[k] = drive_of(word, t)[:2]
+    return np.where(np.isfinite(found), found, np.nan)
 
 
 def lost_driver(system: System, start: float, end: float, far: float = FAST) -> str:
