@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
+from functools import partial
 from numbers import Real
 from pathlib import Path
 from typing import Any, get_args
@@ -417,7 +418,8 @@ def _watcher(
     """The search for events from where the run stands."""
     if resume is not None:
         _check_no_events(events)
-    watcher = Watcher(assembled, method, gains(stabilisation), spacing, events)
+    complete = partial(with_all_reactions, assembled)
+    watcher = Watcher(assembled, method, gains(stabilisation), spacing, events, complete)
     watcher.begin(run.engine, float(run.kept.times[0][0]))
     return watcher
 
@@ -440,10 +442,15 @@ def with_all_reactions(assembled: Assembled, record: Record) -> Record:
     that the motion keeps may depend on one another where the mechanism is not singular."""
     if assembled.all_rows is None:
         return record
-    system = assembled.all_rows
-    engine, one = new_engine(system, record.x[0], record.v[0]), new_record(system, 1)
+    return with_reactions_of(new_engine(assembled.all_rows, record.x[0], record.v[0]), assembled.system, record)
+
+
+def with_reactions_of(engine: Engine, kept: System, record: Record) -> Record:
+    """The record of a system that keeps some rows of a scene, with what the engine of all of them finds at its states."""
+    system = engine.system
+    one = new_record(system, 1)
     names = [block.name for block in system.blocks]
-    numbers = [names.index(block.name) for block in assembled.system.blocks]
+    numbers = [names.index(block.name) for block in kept.blocks]
     reaction, violation, vd = np.empty_like(record.reaction), np.empty_like(record.violation), np.empty_like(record.vd)
     for row, moment in enumerate(record.time):
         engine.x[:], engine.v[:] = record.x[row], record.v[row]

@@ -14,6 +14,7 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from ffr_dyn.analyses.forward import forward
+from ffr_dyn.analyses.integration import with_all_reactions
 from ffr_dyn.analyses.kinematic import Followed, along_the_path
 from ffr_dyn.analyses.outcome import efforts, efforts_told, needed, only, result_of, with_quantities
 from ffr_dyn.analyses.registry import OverTime, option
@@ -150,7 +151,7 @@ def _quasi_static(
         rows.append(copied(at.record))
         if progress is not None:
             progress(float(time))
-    record = joined(rows)
+    record = with_all_reactions(assembled, joined(rows))
     attributes = {
         **described(scene),
         "analysis": "inverse dynamics, quasi-static deformation",

@@ -19,6 +19,7 @@ import numpy as np
 
 from ffr_dyn.analyses.efforts import Effort, JointEffort, MarkerEffort, sized, unit, with_units
 from ffr_dyn.analyses.forward import forward
+from ffr_dyn.analyses.integration import with_reactions_of
 from ffr_dyn.analyses.inversion.bounded import Bounded, Found, bounded_solution
 from ffr_dyn.analyses.inversion.internal_dynamics import fitting, internal
 from ffr_dyn.analyses.inversion.plant import Plant, plant, slopes, with_efforts
@@ -377,6 +378,8 @@ def _recorded(of: Plant, times: Array, found: Found) -> Record:
         here = sized(of.free, of.own.unknown, u)
         here.work.loads.reference[:] = measured
         row = record_states(here, np.clip([time], *of.own.span), x[None], v[None])
+        if of.all_rows is not None:
+            row = with_reactions_of(sized(of.all_rows, of.own.unknown, u).engine, here.system, row)
         rows.append(row._replace(time=np.array([time])))
     return joined(rows)
 
