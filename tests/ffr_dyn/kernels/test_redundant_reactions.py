@@ -180,6 +180,9 @@ def test_planets_share_their_load_in_a_linearised_scene():
 def test_planets_share_their_load_over_the_frequency():
     slow = fd.response(SPRUNG, input=TORQUE, outputs=MESHES, frequencies=[1e-3])
     np.testing.assert_allclose(slow["gain"][0], 1 / 3, rtol=1e-5)
+    large = fd.forced(SPRUNG, input=TORQUE, amplitude=1.0, outputs=MESHES, band_of=(0.5, 0.6))
+    np.testing.assert_allclose(large["mean"], 10 / 3, rtol=1e-5)
+    np.testing.assert_allclose(large["amplitude"][0], 1 / 3, rtol=1e-2)  # far below the only resonance
 
 
 def test_events_on_redundant_reactions_have_their_moment():
