@@ -99,7 +99,7 @@ _Located = tuple[dict[str, Any], Event, int, Record]
 
 class Watcher:
     """Looks for events in the rows of a run, one for each step. `found` lists them as plain data; `ended_by` is the name of
-    the one that has ended the run."""
+    the one that has ended the run. `complete` gives rows the reactions of redundant rows."""
 
     def __init__(
         self,
@@ -108,7 +108,9 @@ class Watcher:
         gains: tuple[float, float, float],
         spacing: float,
         events: Sequence[Event],
+        complete: Callable[[Record], Record],
     ) -> None:
+        self._complete = complete
         self.events, self.found = tuple(events), list[dict[str, Any]]()
         self.ended_by: str | None = None
         system = assembled.system
@@ -124,6 +126,7 @@ class Watcher:
         """Take the state of a run's engine as what comes before the first row."""
         first = new_record(self._system, 1)
         record_row(engine, time, first, 0)  # with which the run has begun
+        first = self._complete(first)
         self._memory = [seen(first, None)[1] for seen in self._seen]
         self._last = first
 
@@ -201,7 +204,7 @@ class Watcher:
         status = fill_rows(engine, end, time, 1)
         if status != OK:
             raise failure(self._system, engine.work, status, time, Settings(method, self._gains[2] > 0))
-        return end
+        return self._complete(end)
 
 
 # ---- what an event looks at -----------------------------------------------------------------------------------------

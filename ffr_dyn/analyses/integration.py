@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
+from functools import partial
 from numbers import Real
 from pathlib import Path
 from typing import Any, get_args
@@ -23,10 +24,10 @@ from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.compile.workspace import new_record
 from ffr_dyn.consistency import failure as failing
 from ffr_dyn.consistency.assemble import BRANCHES, Assembled, assemble
-from ffr_dyn.consistency.doubts import BALANCE, SINGULAR, Seen, between_rows, ended, held, look, nothing_seen
+from ffr_dyn.consistency.doubts import BALANCE, SINGULAR, SUDDEN, Seen, between_rows, ended, held, look, nothing_seen
 from ffr_dyn.consistency.evaluation import joined
 from ffr_dyn.consistency.explicit_forces import told
-from ffr_dyn.consistency.following import LOST, STALLED, Lost, jumped, lost_driver, unfollowed
+from ffr_dyn.consistency.following import LOST, STALLED, Lost, jumped, lost_driver, sudden, unfollowed
 from ffr_dyn.consistency.step_error import ENDED_BY
 from ffr_dyn.consistency.validity import meaningless
 from ffr_dyn.functions.stopwatch import Stopwatch
@@ -140,7 +141,7 @@ def integrate(
                 writer.append(times, {name: quantity.values for name, quantity in part.items()}, _checkpoint(run, mark))
             if progress is not None:
                 progress(float(times[-1]))
-        account = _account(run, header["notes"]) | ({} if watcher is None else _passed(watcher))
+        account = _account(run, header["notes"], fast) | ({} if watcher is None else _passed(watcher))
         if writer is not None:
             writer.close("complete", header | account)
     return _result(scene, run, header | account | {"status": "complete"})
@@ -414,7 +415,8 @@ def _watcher(
     """The search for events from where the run stands."""
     if resume is not None:
         _check_no_events(events)
-    watcher = Watcher(assembled, method, gains(stabilisation), spacing, events)
+    complete = partial(with_all_reactions, assembled)
+    watcher = Watcher(assembled, method, gains(stabilisation), spacing, events, complete)
     watcher.begin(run.engine, float(run.kept.times[0][0]))
     return watcher
 
@@ -437,10 +439,15 @@ def with_all_reactions(assembled: Assembled, record: Record) -> Record:
     that the motion keeps may depend on one another where the mechanism is not singular."""
     if assembled.all_rows is None:
         return record
-    system = assembled.all_rows
-    engine, one = new_engine(system, record.x[0], record.v[0]), new_record(system, 1)
+    return with_reactions_of(new_engine(assembled.all_rows, record.x[0], record.v[0]), assembled.system, record)
+
+
+def with_reactions_of(engine: Engine, kept: System, record: Record) -> Record:
+    """The record of a system that keeps some rows of a scene, with what the engine of all of them finds at its states."""
+    system = engine.system
+    one = new_record(system, 1)
     names = [block.name for block in system.blocks]
-    numbers = [names.index(block.name) for block in assembled.system.blocks]
+    numbers = [names.index(block.name) for block in kept.blocks]
     reaction, violation, vd = np.empty_like(record.reaction), np.empty_like(record.violation), np.empty_like(record.vd)
     for row, moment in enumerate(record.time):
         engine.x[:], engine.v[:] = record.x[row], record.v[row]
@@ -587,11 +594,12 @@ def _result(scene: Scene, run: _Run, attributes: dict[str, Any]) -> Result:
     return Result(np.concatenate(run.kept.times), run.kept.quantities(), geometry(scene), attributes)
 
 
-def _account(run: _Run, notes: list[str]) -> dict[str, Any]:
+def _account(run: _Run, notes: list[str], fast: Fast | None) -> dict[str, Any]:
     """The attributes that only the end of a run can tell."""
     assembled = run.seen.assembled
     info, drift = run.engine.work.info, run.engine.work.drift
     ends, spacing = (assembled.x, run.engine.x), run.energy.spacing
+    span = float(run.kept.times[0][0]), float(run.kept.times[-1][-1])
     return {
         "evaluations": int(info[EVALUATIONS]),
         "projections": int(info[PROJECTIONS]),
@@ -607,6 +615,7 @@ def _account(run: _Run, notes: list[str]) -> dict[str, Any]:
                 run.seen,
                 {
                     SINGULAR: passed_in_words(assembled.system, assembled.blocks, ends, run.engine.work, spacing),
+                    SUDDEN: sudden(assembled.system, np.zeros(0) if fast is None else fast.breaks, *span),
                     BALANCE: run.energy.amiss(),
                     **between_rows(run.seen, run.engine.system, run.engine.work),
                 },

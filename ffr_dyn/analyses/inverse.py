@@ -14,13 +14,14 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from ffr_dyn.analyses.forward import forward
+from ffr_dyn.analyses.integration import with_all_reactions
 from ffr_dyn.analyses.kinematic import Followed, along_the_path
 from ffr_dyn.analyses.outcome import efforts, efforts_told, needed, only, result_of, with_quantities
 from ffr_dyn.analyses.registry import OverTime, option
 from ffr_dyn.analyses.settings import Settings
 from ffr_dyn.analyses.trials.begin import Beginning
 from ffr_dyn.consistency.assemble import Assembled, assemble, flattened
-from ffr_dyn.consistency.doubts import checked
+from ffr_dyn.consistency.doubts import SUDDEN, checked
 from ffr_dyn.consistency.evaluation import Evaluator, copied, evaluate, evaluator, joined, locked
 from ffr_dyn.consistency.mobility import require_driven, undeformed
 from ffr_dyn.equations.layout import moved, to_global_axes, velocity_sizes
@@ -150,7 +151,7 @@ def _quasi_static(
         rows.append(copied(at.record))
         if progress is not None:
             progress(float(time))
-    record = joined(rows)
+    record = with_all_reactions(assembled, joined(rows))
     attributes = {
         **described(scene),
         "analysis": "inverse dynamics, quasi-static deformation",
@@ -158,7 +159,7 @@ def _quasi_static(
         "evaluations": int(at.work.info[EVALUATIONS]),
         "degrees_of_freedom": assembled.degrees_of_freedom,
         "computed": assembled.computed,
-        "notes": [*assembled.notes, *checked("inverse", assembled, record)],
+        "notes": [*assembled.notes, *checked("inverse", assembled, record, {SUDDEN: rigid.sudden})],
         "status": "complete",
     }
     return result_of(assembled.system, record, attributes, path, outputs, rigid.angles)

@@ -9,7 +9,6 @@ parts as that takes; where no part is small enough the mechanism locks.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -21,7 +20,7 @@ from ffr_dyn.analyses.outcome import needed, output_times, result_of, turned_alo
 from ffr_dyn.analyses.registry import OverTime
 from ffr_dyn.analyses.settings import Settings
 from ffr_dyn.closing.limits import with_limits
-from ffr_dyn.compile.divided_steps import fast_of
+from ffr_dyn.compile.divided_steps import breaks_of
 from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.consistency import doubts
 from ffr_dyn.consistency.assemble import Assembled, assemble
@@ -36,6 +35,7 @@ from ffr_dyn.consistency.evaluation import (
     smallest_step,
     total_mass_matrix,
 )
+from ffr_dyn.consistency.following import sudden
 from ffr_dyn.consistency.mobility import named_motion, require_driven, undeformed
 from ffr_dyn.equations.constraint_rows import blocks_of, rows_at
 from ffr_dyn.equations.layout import meets, moved, to_body_axes, to_global_axes
@@ -119,12 +119,13 @@ def kinematic(
 @dataclass(frozen=True)
 class Followed:
     """The rows of a fully driven scene of undeformed bodies, in which forces have counted the turns of their angles along the
-    path; joint angles (T,) with these turns."""
+    path; joint angles (T,) with these turns; of its notes those of drivers that do something at once."""
 
     assembled: Assembled
     record: Record
     angles: dict[str, Array]
     notes: list[str]
+    sudden: list[str]
     evaluations: int
 
 
@@ -140,7 +141,7 @@ def along_the_path(
     require_driven(rigid, start, "a kinematic analysis")
     assembled = assemble(rigid, time=start)
     selected(assembled.system, needed(scene, outputs))
-    _refuse_poles(assembled.system, start, end, output_step)
+    breaks = breaks_of(assembled.system, start, end, output_step)
     at = evaluator(assembled.all_rows or assembled.system)
     pose = replace(
         _pose(at, start, assembled.x, assembled.v), v=to_body_axes(at.system.layout, assembled.x, assembled.v)
@@ -152,9 +153,10 @@ def along_the_path(
         if progress is not None:
             progress(float(time))
     record, angles = _recorded(assembled, followed, rows)
-    notes = [*assembled.notes, *_undeformed_notes(scene)]
-    notes += doubts.checked("kinematic", assembled, record, {doubts.SINGULAR: _singular_notes(at.system, followed)})
-    return Followed(assembled, record, angles, notes, int(at.work.info[EVALUATIONS]))
+    notes, at_once = [*assembled.notes, *_undeformed_notes(scene)], sudden(assembled.system, breaks, start, end)
+    found = {doubts.SINGULAR: _singular_notes(at.system, followed), doubts.SUDDEN: at_once}
+    notes += doubts.checked("kinematic", assembled, record, found)
+    return Followed(assembled, record, angles, notes, at_once, int(at.work.info[EVALUATIONS]))
 
 
 def _undeformed_notes(scene: Scene) -> list[str]:
@@ -230,12 +232,6 @@ def _conditioning(at: Evaluator, now: Evaluation, x: Array) -> tuple[float, floa
     square = weighted.shape[0] == weighted.shape[1]
     sign = float(np.linalg.slogdet(weighted)[0]) if square else 0.0
     return float(values[place.v_size - 1]), sign, np.linalg.solve(lower.T, basis[place.v_size - 1])
-
-
-def _refuse_poles(system: System, start: float, end: float, output_step: float) -> None:
-    """Raises InputError where a function of time grows without bound."""
-    with suppress(ComputationError):  # it may change many times from row to row
-        fast_of(system, start, end, output_step, output_step)
 
 
 def _locked(at: Evaluator, pose: _Pose) -> ComputationError:

@@ -16,6 +16,7 @@ from typing import Any, ClassVar, get_args
 import numpy as np
 
 from ffr_dyn.analyses.efforts import Effort, sized, with_units, with_work, without, work_of
+from ffr_dyn.analyses.integration import with_reactions_of
 from ffr_dyn.analyses.outcome import result_of
 from ffr_dyn.analyses.registry import OfMoment, option
 from ffr_dyn.analyses.rotating.steady import steady
@@ -218,8 +219,12 @@ def linearised(
     several("inputs", inputs, (*get_args(Effort), str)), several("outputs", outputs, (str,))
     fed = with_units(seen_in_space(scene), _efforts(inputs))
     assembled = assemble(fed, time=time)
-    at = _with_inputs(evaluator(assembled.system), scene, inputs, np.zeros(len(inputs)))
-    near = chart(at, time, assembled.x, assembled.v)
+    at, whole = (
+        None if system is None else _with_inputs(evaluator(system), scene, inputs, np.zeros(len(inputs)))
+        for system in (assembled.system, assembled.all_rows)
+    )
+    assert at is not None
+    near = replace(chart(at, time, assembled.x, assembled.v), all_rows=whole)
     if near.steps.size == 0:
         raise InputError("nothing is free to move: joints and drivers fix every motion; linearise with fewer drivers")
     steady = steady_about(near, inputs)
@@ -378,7 +383,8 @@ def _columns(function: Callable[[Array], Array], amounts: Array) -> Array:
 
 
 def _fed(near: Chart, scene: Scene, inputs: tuple[Effort | str, ...], u: Array) -> Chart:
-    return replace(near, at=_with_inputs(near.at, scene, inputs, u))
+    whole = None if near.all_rows is None else _with_inputs(near.all_rows, scene, inputs, u)
+    return replace(near, at=_with_inputs(near.at, scene, inputs, u), all_rows=whole)
 
 
 def _efforts(inputs: tuple[Effort | str, ...]) -> tuple[Effort, ...]:
@@ -446,7 +452,10 @@ def _output_matrices(
     def measured(chart: Chart, deviation: Array) -> Array:
         x, v = state(chart, deviation[:d], deviation[d:])
         evaluate(chart.at, chart.time, x, v)
-        result = result_of(chart.at.system, chart.at.record, {}, outputs=("default", *quantities))
+        record = chart.at.record
+        if chart.all_rows is not None:
+            record = with_reactions_of(chart.all_rows.engine, chart.at.system, record)
+        result = result_of(chart.at.system, record, {}, outputs=("default", *quantities))
         values = np.array([float(result[name][0]) for name in outputs])
         return values - 2 * np.pi * turns * np.round((values - here) / (2 * np.pi))
 

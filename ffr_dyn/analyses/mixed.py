@@ -19,6 +19,7 @@ import numpy as np
 
 from ffr_dyn.analyses.efforts import Effort, JointEffort, MarkerEffort, sized, unit, with_units
 from ffr_dyn.analyses.forward import forward
+from ffr_dyn.analyses.integration import with_reactions_of
 from ffr_dyn.analyses.inversion.bounded import Bounded, Found, bounded_solution
 from ffr_dyn.analyses.inversion.internal_dynamics import fitting, internal
 from ffr_dyn.analyses.inversion.plant import Plant, plant, slopes, with_efforts
@@ -37,10 +38,12 @@ from ffr_dyn.analyses.outcome import (
 )
 from ffr_dyn.analyses.registry import OverTime, option
 from ffr_dyn.analyses.settings import Settings
+from ffr_dyn.compile.divided_steps import breaks_of
 from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.consistency.assemble import Assembled, assemble, flattened
-from ffr_dyn.consistency.doubts import checked
+from ffr_dyn.consistency.doubts import SUDDEN, checked
 from ffr_dyn.consistency.evaluation import joined, record_states
+from ffr_dyn.consistency.following import sudden
 from ffr_dyn.consistency.step_error import Beside
 from ffr_dyn.integrators import Integrator, Within
 from ffr_dyn.integrators.stabilisation import Projection
@@ -268,7 +271,8 @@ def _not_collocated(
         other = _integrated(own, finer, times, w, assembled.x, None) if own.size else None
         differ = FINER ** (-1 / ORDER), ORDER
     record, system = _recorded(whole, times, found), whole.free.system
-    doubted = checked("mixed", replace(assembled, system=system, all_rows=None), record)
+    at_once = sudden(assembled.system, breaks_of(assembled.system, start, end, output_step), start, end)
+    doubted = checked("mixed", replace(assembled, system=system, all_rows=None), record, {SUDDEN: at_once})
     attributes: dict[str, Any] = {
         **described(scene),
         "analysis": f"mixed dynamics, {'bounded' if isinstance(chosen, Bounded) else 'causal'}",
@@ -374,6 +378,8 @@ def _recorded(of: Plant, times: Array, found: Found) -> Record:
         here = sized(of.free, of.own.unknown, u)
         here.work.loads.reference[:] = measured
         row = record_states(here, np.clip([time], *of.own.span), x[None], v[None])
+        if of.all_rows is not None:
+            row = with_reactions_of(sized(of.all_rows, of.own.unknown, u).engine, here.system, row)
         rows.append(row._replace(time=np.array([time])))
     return joined(rows)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from math import ceil
@@ -49,9 +50,14 @@ class Fast:
     step: float
 
     @property
+    def breaks(self) -> Array:
+        """(K,) at which something jumps or switches."""
+        return np.concatenate([self.jumps[:, 1], self.switches])
+
+    @property
     def moments(self) -> Array:
         """(K,) at which powers may change between rows."""
-        return np.concatenate([self.spans[:, 0], self.jumps[:, 1], self.switches])
+        return np.concatenate([self.spans[:, 0], self.breaks])
 
     @property
     def words(self) -> tuple[str, ...]:
@@ -91,6 +97,15 @@ def fast_of(system: System, start: float, end: float, output_step: float, step: 
     found = _with_python(system, made, rows, step) or _written(system, made, rows, step)
     _refuse_poles(system, made, found, (start, end, step))
     return _named(system, found, step)
+
+
+def breaks_of(system: System, start: float, end: float, output_step: float) -> Array:
+    """(K,) when [s] functions of time switch that do not tell it, for analyses without steps. Raises InputError where one
+    grows without bound."""
+    fast = None
+    with suppress(ComputationError):  # it may change many times from row to row
+        fast = fast_of(system, start, end, output_step, output_step)
+    return np.zeros(0) if fast is None else fast.breaks
 
 
 def _refuse_wrong_rates(system: System, rows: Array) -> None:

@@ -13,6 +13,7 @@ from functools import partial
 
 import numpy as np
 
+from ffr_dyn.compile.force_tables import Callback
 from ffr_dyn.compile.memory import check_repeats
 from ffr_dyn.compile.scene_tables import System, of_time
 from ffr_dyn.consistency.assemble import Assembled
@@ -21,6 +22,7 @@ from ffr_dyn.consistency.explicit_forces import candidates, fastest, told
 from ffr_dyn.consistency.following import beyond_one, jump_of, row_named, torn_open, unfollowed
 from ffr_dyn.consistency.validity import extremes, meaningless, strained, unstiffened
 from ffr_dyn.equations.inertia import kept_integrals, mass_matrix
+from ffr_dyn.equations.state_view import StateView
 from ffr_dyn.functions.told_rates import misled, wrong_rate
 from ffr_dyn.integrators import Integrator
 from ffr_dyn.integrators.stabilisation import Projection, Stabilisation
@@ -31,6 +33,7 @@ from ffr_dyn.scene.drivers import Driver, PointDriver
 from ffr_dyn.scene.force_kinds import forces_of
 from ffr_dyn.scene.forces.force import Force
 from ffr_dyn.scene.forces.places import BetweenAxes
+from ffr_dyn.scene.joints import Joint
 from ffr_dyn.scene.scene import Body, Scene, joint_of
 from ffr_prep.body import least_inertia, remembered
 from ffr_prep.common.arrays import Array
@@ -56,10 +59,12 @@ TABLE: dict[str, dict[str, str]] = {
     "mechanism come apart": _verdicts(ERROR, NOTE, ERROR, ERROR, ERROR),
     "driver not followed": _verdicts(ERROR, NOTE, ERROR, ERROR, ERROR),
     "driver faster than the step": _verdicts(NOTE, NOTE, NONE, NONE, NONE),
+    "driven motion that jumps": _verdicts(NOTE, NONE, NOTE, NONE, NONE),
     "energy multiplied": _verdicts(ERROR, NONE, NONE, NONE, NONE),  # at once, by `ffr_dyn.analyses.energy`
     "energy come or gone": _verdicts(NOTE, NONE, NONE, NONE, NONE),
     "force too stiff for the step": _verdicts(NOTE, NOTE, NONE, NONE, NONE),
     "bushing turned by half a turn": _verdicts(NOTE, NOTE, NONE, NOTE, NOTE),
+    "formula beyond half a turn": _verdicts(NOTE, NOTE, NOTE, NONE, NONE),
     "deformed beyond the theory": _verdicts(NOTE, NOTE, NONE, NOTE, NOTE),
     "deformed beyond any meaning": _verdicts(ERROR, NOTE, NONE, ERROR, ERROR),
     "spin without stiffening": _verdicts(NOTE, NOTE, NONE, NONE, NOTE),
@@ -67,7 +72,8 @@ TABLE: dict[str, dict[str, str]] = {
     "mass matrix nearly singular": _verdicts(NOTE, NOTE, NONE, NOTE, NOTE),
     "kink of a force": _verdicts(NONE, NONE, NONE, NONE, NONE) | {"linearise": NOTE},
 }
-OPEN, APART, ASTRAY, QUICK, _, BALANCE, STIFF, WOUND, STRAINED, MEANINGLESS, SPUN, SINGULAR, MASS, KINK = TABLE
+OPEN, APART, ASTRAY, QUICK, SUDDEN, _, BALANCE, STIFF, WOUND, WRAPPED, *_REST = TABLE
+STRAINED, MEANINGLESS, SPUN, SINGULAR, MASS, KINK = _REST
 
 MET = 1e-8  # m, -: of constraints that Newton's method closes
 KEPT = 10.0  # times the tolerance of a projection
@@ -76,6 +82,7 @@ KEPT = 10.0  # times the tolerance of a projection
 DRIFTED, TORN = 1e-5, 1e-2
 BESIDE = 0.1  # rad, by which a driven angle may differ
 TURNED = 0.1  # rad, or of the scene's size: h^2 times a driver's second derivative that a step bears
+PASSES = 8  # of half a turn in some rows, at which a formula is looked at
 DEPENDENT = 1e-8  # smallest eigenvalue of a mass matrix with ones on its diagonal
 FAR = 1e-2  # from zero, where a bound of it will do
 
@@ -89,8 +96,10 @@ class Seen:
     arrays    : "bodies" (4, B) as `ffr_dyn.consistency.validity.extremes`; "open" (3,) the largest constraint left open, its
                 time, its number; "driven" (2, D) of each driver the largest difference from what it prescribes, and its
                 largest second derivative; "told" (4, C) a derivative that a Python function of time tells and has not, of
-                order 0 where there is none; "rates" (F,) [1/s] of the forces that the method takes explicitly; "wound" (F,)
-                [rad] how far the axes of forces in six directions are turned against each other; "x" (X,) of the last row
+                order 0 where there is none; "torn" (3, A) of each angle that a formula of a force reads the last, whether the
+                formula has jumped as it passed half a turn, and when; "rates" (F,) [1/s] of the forces that the method takes
+                explicitly; "wound" (F,) [rad] how far the axes of forces in six directions are turned against each other;
+                "x" (X,) of the last row
     """
 
     assembled: Assembled
@@ -111,6 +120,7 @@ def nothing_seen(
     scene = assembled.system.scene
     sizes = {"bodies": (4, len(scene.bodies)), "open": (3,), "driven": (2, len(scene.drivers))}
     sizes |= {"told": (4, len(assembled.system.user.callbacks))}
+    sizes |= {"torn": (3, len(_read_angles(assembled.system)))}
     sizes |= {"rates": (len(forces_of(scene)),), "wound": (len(forces_of(scene)),), "x": (assembled.x.size,)}
     return Seen(assembled, method, tolerance, apart, {name: np.zeros(size) for name, size in sizes.items()})
 
@@ -146,6 +156,8 @@ def look(seen: Seen, view: View) -> None:
             wrong := wrong_rate(partial(of_time, callback), rows.time, min(callback.sizes) - 1)
         ):
             arrays["told"][:, number] = wrong
+    for number, (callback, joint) in enumerate(_read_angles(system)):
+        arrays["torn"][:, number] = _torn(callback, joint, view, arrays["torn"][:, number])
     arrays["wound"][:] = np.maximum(arrays["wound"], [_wound(view, k, force) for k, force in _forces(seen)])
     if seen.method is not None and (explicit := candidates(system, seen.method)):
         arrays["rates"][:] = np.maximum(arrays["rates"], fastest(evaluator(system), rows, explicit))
@@ -160,6 +172,24 @@ def _wound(view: View, k: int, force: Force) -> float:
     if not isinstance(force.place, BetweenAxes):
         return 0.0
     return float(np.linalg.norm(measured_values(view, k, slice(3, 6)), axis=1).max(initial=0.0))
+
+
+def _read_angles(system: System) -> list[tuple[Callback, Joint]]:
+    """Formulas of forces and the joints whose angles they read (`ffr_dyn.scene_file.state_formula.StateFormula`)."""
+    joints = system.scene.joints
+    return [(one, j) for one in system.user.callbacks for j in joints if j.name in getattr(one.function, "angles", ())]
+
+
+def _torn(callback: Callback, joint: Joint, view: View, before: Array) -> tuple[float, float, float]:
+    """What is kept of an angle that a formula reads, with the rows that follow; `before` of those up to now."""
+    system, rows, angles = view.system, view.record, _angle(view, joint)
+    last, jumped, time = before.tolist()
+    passed = np.flatnonzero(np.abs(np.diff(angles, prepend=last)) > np.pi)
+    for row in () if jumped else [*passed[:PASSES].tolist(), *[len(angles) - 1] * bool(passed.size)]:
+        state = StateView(system.scene, system.layout, rows.x[row], rows.v[row])
+        if callback.function.torn(joint.name, float(rows.time[row]), state):  # type: ignore[attr-defined]
+            jumped, time = 1.0, float(rows.time[passed[0]])
+    return float(angles[-1]), jumped, time
 
 
 def _opened(assembled: Assembled, rows: Record, row: int) -> tuple[float, float, float]:
@@ -178,10 +208,15 @@ def _driven(view: View, driver: Driver | PointDriver) -> tuple[float, float]:
     growth = float(np.abs(prescribed[:, 2]).max())
     if driver.coordinate != "angle":
         return 0.0, growth
-    on_i, on_j = view.joint_frames(joint_of(view.system.scene, driver))
-    angle = np.arctan2(dot(on_i[:, :, 1], on_j[:, :, 0]), dot(on_i[:, :, 0], on_j[:, :, 0]))
+    angle = _angle(view, joint_of(view.system.scene, driver))
     off = np.remainder(angle - prescribed[:, 0] + np.pi, 2 * np.pi) - np.pi
     return float(np.abs(off).max()), growth
+
+
+def _angle(view: View, joint: Joint) -> Array:
+    """(T,) [rad] within half a turn."""
+    on_i, on_j = view.joint_frames(joint)
+    return np.arctan2(dot(on_i[:, :, 1], on_j[:, :, 0]), dot(on_i[:, :, 0], on_j[:, :, 0]))
 
 
 def between_rows(seen: Seen, system: System, work: Work, rows: Record | None = None) -> dict[str, list[str]]:
@@ -232,7 +267,8 @@ def ended(analysis: str, seen: Seen, more: Mapping[str, Sequence[str]] | None = 
     for doubt in (doubt for doubt, verdicts in TABLE.items() if verdicts[analysis] == ERROR):
         for text in found.get(doubt, ()):
             raise ComputationError(text)
-    return [text for doubt, verdicts in TABLE.items() if verdicts[analysis] == NOTE for text in found.get(doubt, ())]
+    noted = [doubt for doubt, verdicts in TABLE.items() if verdicts[analysis] == NOTE]
+    return list(dict.fromkeys(text for doubt in noted for text in found.get(doubt, ())))
 
 
 def _found(seen: Seen) -> dict[str, list[str]]:
@@ -252,6 +288,7 @@ def _found(seen: Seen) -> dict[str, list[str]]:
         QUICK: quick,
         STIFF: [] if seen.method is None else told(seen.assembled.system, seen.method, seen.arrays["rates"]),
         WOUND: [text for k, force in _forces(seen) if (text := force.beyond(float(seen.arrays["wound"][k])))],
+        WRAPPED: list(_wrapped(seen)),
         STRAINED: strained(scene, turned, deflected, stretched),
         MEANINGLESS: [lost] if lost else [],
         SPUN: unstiffened(scene, spun),
@@ -274,6 +311,17 @@ def _constraints(seen: Seen, quick: list[str]) -> dict[str, list[str]]:
         what = "the driver is not followed" if block.driver else "the mechanism has come apart"
         return {APART: [f"{where}: {what}; {quick[0] if quick else change}"]}
     return {OPEN: [f"{where}, the most of all, and more than {seen.tolerance * larger:.1g}; {change}"]}
+
+
+def _wrapped(seen: Seen) -> Iterator[str]:
+    read = _read_angles(seen.assembled.system)
+    for (callback, joint), (_, jumped, time) in zip(read, seen.arrays["torn"].T, strict=True):
+        if jumped:
+            yield (
+                f"{callback.what}: its formula reads {joint.name}.angle, which is known within half a turn, and jumps where "
+                f"the joint passes half a turn, as at t = {time:.6g} s; use a servo or a joint spring, which count turns, or "
+                "sin and cos of the angle"
+            )
 
 
 def _astray(driver: Driver | PointDriver, off: float) -> str:

@@ -6,6 +6,8 @@ asked for, however well the joints are closed at their ends.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +15,7 @@ import numpy as np
 from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.equations.constraint_rows import Block, drive_of
 from ffr_dyn.equations.layout import angular_speeds
-from ffr_dyn.kernels.tables import MOMENT, OPENED, PHI, Record, Work
+from ffr_dyn.kernels.tables import MOMENT, OPENED, PHI, UNTIL, Record, Work
 from ffr_dyn.scene.joints import COINCIDENCE, DISTANCE, DOT_2, RELATION, Word
 from ffr_dyn.scene.scene import Scene
 from ffr_prep.common.arrays import Array
@@ -24,6 +26,9 @@ FAST = 0.3  # rad, or of that size, that a driver may move by within a step that
 STALLED = 1.0  # the same within two steps, of which one has failed
 SAMPLES = 65  # of a driver within a step
 HALVINGS = 30
+LOOKS = 257  # of a driven motion over a run, for its size
+BESIDE = 1e-9  # of a run, at which a driven motion is looked at on both sides of a moment
+AT_ONCE, STEADY = 1e-2, 1e-6  # of its largest rate, of its range: what a rate, and a value, may change by there
 SUDDEN = 0.5  # of a change, which takes the smallest part of a step: a jump
 
 
@@ -83,6 +88,52 @@ def jumped(system: System, times: Array) -> str:
             if abs(jump) > SUDDEN * off[k]:
                 return _told_jump(block, word, time, jump)
     return ""
+
+
+def sudden(system: System, breaks: Array, start: float, end: float) -> list[str]:
+    """Which drivers and lengths jump between two times [s], or change their rates at once, in words.
+
+    breaks : (K,) [s] at which functions of time jump or switch, beside those that they tell
+    """
+    aside = BESIDE * (end - start)
+    times = np.concatenate([system.model.functions.breaks[:, UNTIL], breaks])
+    times = np.unique(times[(times > start + aside) & (times < end - aside)])
+    if not times.size:
+        return []
+    said = [(block, word) for block in system.blocks for word in block.words if word.function is not None]
+    return [text for block, word in said for text in _broken(block, word, times, np.linspace(start, end, LOOKS))]
+
+
+def _broken(block: Block, word: Word, times: Array, looks: Array) -> Iterator[str]:
+    """What a driven motion does at once at any of the times [s]; looks : (L,) from the first time to the last."""
+    aside = BESIDE * float(looks[-1] - looks[0])
+    before, behind = (_prescribed(word, times + side) for side in (-aside, aside))
+    value, rate = np.concatenate([before, behind, _prescribed(word, looks)]).T
+    fastest = float(np.nanmax(np.abs(rate), initial=0.0))
+    jumps = behind[:, 0] - before[:, 0] - aside * (behind[:, 1] + before[:, 1])
+    for k in np.flatnonzero(np.abs(jumps) > STEADY * (np.nanmax(value) - np.nanmin(value) + aside * fastest)).tolist()[
+        :1
+    ]:
+        yield _told_jump(block, word, float(times[k]), float(jumps[k]))
+    changes = behind[:, 1] - before[:, 1]
+    at_once = np.flatnonzero(np.abs(changes) > AT_ONCE * fastest)
+    if at_once.size:
+        k = int(at_once[np.argmax(np.abs(changes[at_once]))])
+        more = f", and at {at_once.size - 1} more such times" if at_once.size > 1 else ""
+        yield (
+            f"{_called(block)} changes its rate by {changes[k]:.4g} {_unit(word)}/s at once at t = {times[k]:.6g} s{more}: "
+            "that takes an impulse, which no force, effort, power or work of the result holds; round the corner, as `smooth` "
+            "and `ramp` do, or let a table go on"
+        )
+
+
+def _prescribed(word: Word, times: Array) -> Array:
+    """(T, 2) value and rate of a driven motion, NaN where it has none: no step needs to have been there."""
+    found = np.full((times.size, 2), np.nan)
+    for k, t in enumerate(times.tolist()):
+        with suppress(Exception):
+            found[k] = drive_of(word, t)[:2]
+    return np.where(np.isfinite(found), found, np.nan)
 
 
 def lost_driver(system: System, start: float, end: float, far: float = FAST) -> str:

@@ -155,7 +155,10 @@ def require_driven(scene: Scene, time: float, analysis: str) -> None:
         )
     if found.rigid:  # at a singular position there are more free motions than the mechanism has
         said = "; ".join(f"{motion.name} (moves {', '.join(motion.bodies)})" for motion in found.free)
-        raise InputError(f"{analysis} needs every rigid motion prescribed by a driver; free: {said}")
+        raise InputError(
+            f"{analysis} needs every rigid motion prescribed by a driver; free: {said}; add a driver for each, or a joint "
+            "that holds it, as a universal joint does at one end of a rod that turns about itself between two spherical ones"
+        )
 
 
 def _jacobian(scene: Scene, place: Layout, blocks: list[Block], x: Array, v: Array, time: float) -> Array:

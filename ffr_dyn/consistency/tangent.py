@@ -37,6 +37,7 @@ class Chart:
 
     V : (V,) velocities in body axes;  Z : (V, d) free motions;  W : (V, d) = M Z, with W^T Z = 1
     steps : (d,) deviations of the size STEP
+    all_rows : the same scene with its redundant rows, for reactions; None where it has none
     """
 
     at: Evaluator
@@ -47,6 +48,7 @@ class Chart:
     Z: Array
     W: Array
     steps: Array
+    all_rows: Evaluator | None = None
 
 
 def chart(at: Evaluator, time: float, x: Array, v: Array) -> Chart:

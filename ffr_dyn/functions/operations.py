@@ -109,7 +109,7 @@ def value(op: int, parameter: float, a: float, b: float) -> float:
     if op == DIVIDE:
         return a / b
     if op in (MIN, MAX):
-        return a if (op == MIN) == (a <= b) else b
+        return a if (op == MAX) == (a >= b) else b
     return math.pow(a, parameter) if op == POWER else _VALUE[op](a)
 
 
@@ -126,6 +126,6 @@ def operate(op: int, parameter: float, a: Triple, b: Triple) -> Triple:
         rate = (a[1] - f * b[1]) / b[0]
         return f, rate, (a[2] - 2 * rate * b[1] - f * b[2]) / b[0]
     if op in (MIN, MAX):
-        return a if f == a[0] else b
+        return a if (op == MAX) == (a[0] >= b[0]) else b  # where both are one as behind a switch (`breaks.switches`)
     first, second = _derivatives_of_power(a[0], parameter) if op == POWER else _DERIVATIVES[op](a[0])
     return f, first * a[1], second * a[1] ** 2 + first * a[2]

@@ -94,7 +94,7 @@ def of_two(op, a, b):
         value = a[0] / b[0]
         rate = (a[1] - value * b[1]) / b[0]
         return value, rate, (a[2] - 2.0 * rate * b[1] - value * b[2]) / b[0]
-    if (op == MIN) == (a[0] <= b[0]):
+    if (op == MAX) == (a[0] >= b[0]):  # where both are one as `ffr_dyn.kernels.functions.switched` has it
         return a
     return b
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ffr_dyn.compile.engine import with_model
-from ffr_dyn.compile.scene_tables import System
+from ffr_dyn.consistency.evaluation import Evaluator
 from ffr_dyn.functions.time_functions import HARMONIC
 from ffr_dyn.kernels.tables import Record
 from ffr_dyn.linear.continuation import Problem
@@ -29,27 +29,23 @@ MARK = 1.61803398874989e-3  # Hz: the frequency by which the input is known amon
 class Wave:
     """An input of the size amplitude (2 pi f)^power.
 
-    slots : where the wave's numbers begin in the data of the time functions
     scale : (2 d,) of deviations that count as one, the same at all frequencies
     """
 
     of: Turns
     amplitude: float
     power: int
-    slots: Array
     scale: Array
 
     def at(self, frequency: float, share: float = 1.0) -> Turns:
         """The map over a period of the frequency [Hz], under a share of the input."""
         of, omega = self.of, 2 * np.pi * frequency
-        model = of.system.model
-        data = model.functions.data.copy()
-        data[self.slots + 1], data[self.slots + 2] = share * self.amplitude * omega**self.power, omega
-        model = model._replace(functions=model.functions._replace(data=data))
-        at = replace(of.near.at, engine=with_model(of.near.at.engine, model))
+        size = share * self.amplitude * omega**self.power
+        at, whole = _under(of.near.at, size, omega), of.near.all_rows
+        whole = None if whole is None else _under(whole, size, omega)
         method: Any = of.method
-        period = 1 / frequency
-        return replace(of, near=replace(of.near, at=at), method=replace(method, step=period / of.steps), period=period)
+        near, period = replace(of.near, at=at, all_rows=whole), 1 / frequency
+        return replace(of, near=near, method=replace(method, step=period / of.steps), period=period)
 
     def deviation(self, u: Array) -> Array:
         return u * self.scale
@@ -57,14 +53,17 @@ class Wave:
 
 def wave(of: Turns, amplitude: float, power: int, frequency: float) -> Wave:
     """The input of a map whose scene has it at the frequency MARK; deviations count as at a frequency [Hz]."""
-    return Wave(of, amplitude, power, _slots(of.system), replace(of, period=1 / frequency).scale)
+    return Wave(of, amplitude, power, replace(of, period=1 / frequency).scale)
 
 
-def _slots(system: System) -> Array:
-    functions = system.model.functions
+def _under(at: Evaluator, size: float, omega: float) -> Evaluator:
+    """The scene with a wave of this size and frequency [rad/s] in place of that of the frequency MARK."""
+    model = at.system.model
+    functions, data = model.functions, model.functions.data.copy()
     starts = functions.start[:-1][functions.kind == HARMONIC]
-    found: Array = starts[functions.data[starts + 2] == 2 * np.pi * MARK]
-    return found
+    marked = starts[data[starts + 2] == 2 * np.pi * MARK]
+    data[marked + 1], data[marked + 2] = size, omega
+    return replace(at, engine=with_model(at.engine, model._replace(functions=functions._replace(data=data))))
 
 
 def over_frequency(of: Wave, first: float, last: float) -> Problem:

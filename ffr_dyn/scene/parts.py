@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from itertools import groupby
 from typing import Any
 
 import numpy as np
@@ -61,9 +60,16 @@ def _parts(body: Any) -> Iterable[Any]:
 
 
 def wholes(bodies: Iterable[Any]) -> dict[str, list[Any]]:
-    """The parts in a scene by the name of their whole."""
-    parts = [body for body in bodies if body.part_of is not None]
-    return {name: list(of) for name, of in groupby(parts, owner)}
+    """The parts in a scene by the name of their whole, in order along it, in whichever order the scene has them."""
+    found = dict[str, list[Any]]()
+    for body in bodies:
+        if body.part_of is not None:
+            found.setdefault(owner(body), []).append(body)
+    return {name: sorted(of, key=_number) for name, of in found.items()}
+
+
+def _number(part: Any) -> int:
+    return int(part.name.rpartition("_")[2])
 
 
 def cut_joints(bodies: Iterable[Any]) -> list[Joint]:

@@ -19,6 +19,9 @@ from ffr_dyn.scene.scene import GROUND, Scene, marker_names, marker_number
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 
+LOOKS = 9  # of a turn, for the size of a force
+SAME = 1e-9  # of it: rounding
+
 
 @dataclass(frozen=True)
 class StateFormula:
@@ -35,10 +38,26 @@ class StateFormula:
         """Numbers of the expressions that are zero whatever moves, which tell a plane that nothing acts across it."""
         return tuple(k for k, one in enumerate(self.expressions) if isinstance(one, TimeFunction) and is_zero(one))
 
+    @cached_property
+    def angles(self) -> frozenset[str]:
+        """Names of the joints whose angles it reads, each within half a turn."""
+        names = {name for expression in self.expressions for name in names_in(expression)}
+        return frozenset(name.removesuffix(".angle") for name in names if name.endswith(".angle"))
+
+    def torn(self, joint: str, t: float, state: StateView) -> bool:
+        """Whether it jumps where the angle of a joint goes over from half a turn to minus half a turn."""
+        measured, angles = self._measured(state), np.linspace(-np.pi, np.pi, LOOKS)
+        of = [[value_of(one, t, measured | {f"{joint}.angle": float(a)}) for a in angles] for one in self.expressions]
+        values = np.nan_to_num(of)
+        return bool((np.abs(values[:, -1] - values[:, 0]) > SAME * np.abs(values).max(axis=1)).any())
+
     def __call__(self, t: float, state: StateView) -> Array | float:
-        measured = {name: _read(state, name) for expression in self.expressions for name in names_in(expression)}
+        measured = self._measured(state)
         values = np.array([value_of(expression, t, measured) for expression in self.expressions])
         return values if values.size > 1 else values[0]
+
+    def _measured(self, state: StateView) -> dict[str, float]:
+        return {name: _read(state, name) for expression in self.expressions for name in names_in(expression)}
 
 
 def check_names(scene: Scene, formula: StateFormula, what: str) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -66,6 +65,7 @@ def parameters_of(info: ValidationInfo) -> Mapping[str, Any]:
     return found
 
 
+SHOWN = 60  # letters of a line
 THREE = Key(min_length=3, max_length=3)
 
 Number = Annotated[float, In("1")]
@@ -237,13 +237,23 @@ def _piecewise(entry: PiecewiseEntry) -> TimeFunction:
 
 def _read_table(file: Path) -> TimeFunction:
     what = "a file of two columns of numbers, time and value"
-    with reading(file, what, ValueError), warnings.catch_warnings():
-        warnings.simplefilter("ignore", UserWarning)  # of a file without numbers, whose columns are counted below
-        columns = np.loadtxt(read_text(file, what).splitlines(), delimiter=",", ndmin=2, comments="#")
-    if columns.shape[1] != 2:
-        found = f"{columns.shape[1]} columns" if columns.size else "no numbers"
-        raise InputError(f"{file} has {found}; it needs two columns, time and value")
-    return table(columns[:, 0], columns[:, 1])
+    with reading(file, what):
+        lines = [line.partition("#")[0].strip() for line in read_text(file, what).splitlines()]
+    rows = [_two_numbers(file, number, line) for number, line in enumerate(lines, 1) if line]
+    if not rows:
+        raise InputError(f"{file} has no numbers; it needs two columns, time and value")
+    return table(*np.array(rows).T)
+
+
+def _two_numbers(file: Path, number: int, line: str) -> tuple[float, float]:
+    try:
+        time, value = map(float, line.split(","))
+    except ValueError:
+        raise InputError(
+            f"{file}, line {number}: {line[:SHOWN]!r} is no time and value; give two numbers with a comma between, and write "
+            "'#' before a line of words"
+        ) from None
+    return time, value
 
 
 _Given = Annotated[

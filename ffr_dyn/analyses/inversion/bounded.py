@@ -22,6 +22,7 @@ Dynamics 31 (2014) 189-211; Hairer, Nørsett & Wanner 1993, sec. III.10.)
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import KW_ONLY, dataclass
 from typing import Any
 
@@ -174,7 +175,7 @@ def _equilibria(of: Plant, y: Array, x: Array) -> Iterator[_End]:
 
 def _equilibrium(of: Plant, time: float, y: Array, u: Array, x: Array, at: Slopes) -> tuple[Array, Array, Array]:
     """(y, u, x) by Newton's method on a(y, 0) + A u = 0, s(y) = 0, with derivatives from nearby, renewed where it is slow."""
-    still, before = np.zeros(of.size), np.inf
+    still, before, fresh = np.zeros(of.size), np.inf, False
     for _ in range(ITERATIONS):
         now = look(of, time, y, still, u, x)
         x, scale = now.x, time_unit(at) ** 2
@@ -183,15 +184,18 @@ def _equilibrium(of: Plant, time: float, y: Array, u: Array, x: Array, at: Slope
         matrix = np.block([[scale * at.by_y, at.by_u * efforts], [at.outputs, np.zeros((len(u), len(u)))]])
         step = np.linalg.lstsq(matrix, -np.concatenate([scale * now.y_ddot, now.s]), rcond=1e-12)[0]
         y, u = y + step[: y.size], u + step[y.size :] * efforts / scale
-        size = float(np.abs(step[: y.size]).max())
-        if size < 1e-11 * max(1.0, float(np.abs(y).max())):
+        size, largest = float(np.abs(step[: y.size]).max()), max(1.0, float(np.abs(y).max()))
+        slow = size > SLOW * before
+        if size < 1e-11 * largest or (
+            fresh and slow and size < ROUNDING * largest
+        ):  # of the positions that x meets y by
             left = np.abs(now.y_ddot).max(), np.abs(now.s).max(initial=0.0)
             if left[0] <= REST * max(of.own.lasts**-2, float(np.abs(at.by_y).max())) and left[1] < REST:
                 return y, u, x
             break  # forces along a motion without stiffness
-        if size > SLOW * before:
+        if slow:
             at = slopes(of, time, y, still, u, x)
-        before = size
+        before, fresh = size, slow
     if np.abs(now.s).max(initial=0.0) > REST:
         raise ComputationError(f"at t = {time:.6g} s no position belongs to the known motions: they are out of reach")
     raise ComputationError(
@@ -287,10 +291,12 @@ def _collocated(of: Plant, times: Array, places: list[_End], progress: Told, pat
             return path
         if size > SLOW * before and count < times.size:
             count = min(2 * count, times.size)
-            solve = _linear(_renewed(of, times, path, h, count), places[0], places[-1], h)
+            with suppress(ComputationError):  # where the corrections have led to: the next look there tells it, too
+                solve = _linear(_renewed(of, times, path, h, count), places[0], places[-1], h)
         before, settled = size, moved
     raise ComputationError(
-        f"the bounded solution did not converge: the last correction was {size:.3g}; use a smaller output step or more parts"
+        f"the bounded solution did not converge: the last correction was {size:.3g}; use a smaller output step, more parts, "
+        "or fewer modes of flexible bodies"
     )
 
 

@@ -18,7 +18,7 @@ from ffr_dyn.analyses.inversion.servo import ServoMotion, guided, left_free, pla
 from ffr_dyn.analyses.inversion.turns import count_turns
 from ffr_dyn.compile.engine import with_model
 from ffr_dyn.compile.scene_tables import compile_scene
-from ffr_dyn.consistency.assemble import Assembled
+from ffr_dyn.consistency.assemble import RELAXATION, Assembled
 from ffr_dyn.consistency.evaluation import Evaluator, evaluate, evaluator
 from ffr_dyn.equations.constraint_rows import blocks_of
 from ffr_dyn.equations.layout import to_global_axes
@@ -30,6 +30,7 @@ class Plant:
     """The scene in coordinates y (`own`), and without its known motions (`free`), whose efforts stand in `slots`.
 
     left_free : names of coordinates that describe what the known motions leave free
+    all_rows  : as `free`, with redundant rows, for reactions; None where there are none
     """
 
     own: ServoMotion
@@ -37,6 +38,7 @@ class Plant:
     slots: Array
     shares: Array
     left_free: tuple[str, ...]
+    all_rows: Evaluator | None
 
     @property
     def size(self) -> int:
@@ -77,7 +79,8 @@ def plant(
     loads = model.loads._replace(data=model.loads.data.copy())
     loads.data[slots] = 0.0
     free = replace(free, engine=with_model(free.engine, model._replace(loads=loads)))
-    return Plant(own, free, slots, shares, left_free(assembled, span[0]))
+    whole = None if assembled.all_rows is None else evaluator(compile_scene(free.system.scene, None, RELAXATION))
+    return Plant(own, free, slots, shares, left_free(assembled, span[0]), whole)
 
 
 def with_efforts(of: Plant, efforts: tuple[Effort, ...]) -> Plant:

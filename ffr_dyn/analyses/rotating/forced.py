@@ -11,6 +11,7 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from ffr_dyn.analyses.efforts import Effort
+from ffr_dyn.analyses.integration import with_reactions_of
 from ffr_dyn.analyses.linearise import quantities_of
 from ffr_dyn.analyses.outcome import result_of
 from ffr_dyn.analyses.registry import OfMoment, option
@@ -18,6 +19,7 @@ from ffr_dyn.analyses.rotating.inputs import Acting, absolute_order, acting, com
 from ffr_dyn.analyses.rotating.response import about_state, band_in_words
 from ffr_dyn.analyses.settings import MomentSettings
 from ffr_dyn.consistency.assemble import assemble
+from ffr_dyn.consistency.evaluation import evaluator
 from ffr_dyn.functions.time_functions import harmonic
 from ffr_dyn.integrators import ROS3
 from ffr_dyn.linear.continuation import Solution, branch, folds
@@ -174,7 +176,8 @@ def _wave(
     assembled = assemble(excited(scene, acts, harmonic(amplitude=amplitude, frequency=MARK, phase=phase)))
     period = 1 / MARK
     of = turns(assembled.system, 0.0, assembled.x, assembled.v, ROS3(period / steps), period)
-    of = replace(of, steps=-(-steps // ROWS) * ROWS, rows=ROWS)
+    whole = None if assembled.all_rows is None else evaluator(assembled.all_rows)
+    of = replace(of, near=replace(of.near, all_rows=whole), steps=-(-steps // ROWS) * ROWS, rows=ROWS)
     return wave(of, amplitude, power, float(np.sqrt(band[0] * band[1]))), assembled.notes
 
 
@@ -182,6 +185,8 @@ def _motion(of: Wave, acts: Acting, at: Solution, names: Sequence[str]) -> Array
     """(T, O) the outputs after every step of a period, among which those they cover are found, with what the base adds to
     those that are absolute."""
     turning, record = period(of, at.u, float(np.exp(at.p)), of.of.steps)
+    if turning.near.all_rows is not None:
+        record = with_reactions_of(turning.near.all_rows.engine, turning.system, record)
     wanted = quantities_of(turning.near, tuple(names))
     result = result_of(turning.system, record, {}, outputs=("default", *wanted))
     values = np.stack([result[name] for name in names], axis=1)

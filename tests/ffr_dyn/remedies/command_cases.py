@@ -145,6 +145,9 @@ FILES = [
     texts(DRIVER.replace('"0.3 + 2 * t"', '{table_file = "three.toml"}'),
           DRIVER.replace('"0.3 + 2 * t"', '{table_file = "two.toml"}'),
           three="0, 0, 1\n1, 1, 2\n", two="0, 0\n1, 1\n"),
+    texts(DRIVER.replace('"0.3 + 2 * t"', '{table_file = "none.toml"}'),
+          DRIVER.replace('"0.3 + 2 * t"', '{table_file = "two.toml"}'),
+          none="# time, angle\n", two="# time, angle\n0, 0\n\n1, 1  # end\n"),
 ]  # fmt: skip
 
 # ---- written ------------------------------------------------------------------------------------------------------------

@@ -196,6 +196,18 @@ def test_stress_and_section_forces_are_those_of_the_whole():
         np.testing.assert_allclose(four[name], one[name], atol=2e-4 * np.abs(one[name]).max())
 
 
+def test_the_order_in_which_a_scene_has_parts_changes_nothing():
+    """Bodies in another order, with another one between them: each part is still found by the name of the whole."""
+    sensors = (SectionMeasurement("root", "beam", (0.1, 0, 0)), SectionMeasurement("m", "beam", (0.7, 0, 0)))
+    scene = pushed(beam(4), measurements=sensors)
+    scene = replace(scene, bodies=tuple(replace(body, damping=0.01) for body in scene.bodies))
+    mixed = replace(scene, bodies=tuple(scene.bodies[k] for k in (2, 0, 3, 1)))
+    one, other = static(scene), static(mixed)
+    assert sorted(other.attributes["notes"]) == sorted(one.attributes["notes"])
+    for name in ("measured.root", "measured.m", "beam.tip.position", "clamp.force"):
+        np.testing.assert_allclose(other[name], one[name], rtol=0, atol=1e-9 * np.abs(one[name]).max())
+
+
 # ---- forces on surfaces -------------------------------------------------------------------------------------------
 
 

@@ -321,6 +321,7 @@ MOTOR = '[drivers.m]\njoint = "hinge"\nfunction = '
         ("[drivers]", MOTOR + '{table = [[0, 1]]}', ["drivers.m", "table"]),
         ("[drivers]", MOTOR + '{polynomial = [1], formula = "t"}', ["exactly one of"]),
         ("[drivers]", MOTOR + '{table_file = "none.csv"}', ["none.csv does not exist"]),
+        ("[drivers]", MOTOR + '{table_file = "named.csv"}', ["named.csv, line 2: 'time, angle' is no", "write '#'"]),
         ("[drivers]", MOTOR + '{harmonic = {amplitude = 1}}', ["frequency [Hz] or speed"]),
         ("[drivers]", MOTOR + 'true', ["drivers.m"]),
         ("[drivers]", MOTOR + '[1]', ["give a number, a formula or a table"]),
@@ -344,6 +345,7 @@ MOTOR = '[drivers.m]\njoint = "hinge"\nfunction = '
 )  # fmt: skip
 def test_mistakes_are_named_with_their_place(tmp_path, old, new, words):
     path = written(tmp_path, changed(old, new))
+    (tmp_path / "named.csv").write_text("# a motor\ntime, angle\n0, 0\n1, 1\n", encoding="utf-8")
     if not words:
         load_scene(path)  # a text that nothing uses as a number may stand
         return
