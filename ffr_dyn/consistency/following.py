@@ -111,20 +111,24 @@ def _broken(block: Block, word: Word, times: Array, looks: Array) -> Iterator[st
     value, rate = np.concatenate([before, behind, _prescribed(word, looks)]).T
     fastest = float(np.nanmax(np.abs(rate), initial=0.0))
     jumps = behind[:, 0] - before[:, 0] - aside * (behind[:, 1] + before[:, 1])
-    for k in np.flatnonzero(np.abs(jumps) > STEADY * (np.nanmax(value) - np.nanmin(value) + aside * fastest)).tolist()[
-        :1
-    ]:
+    least = STEADY * (np.nanmax(value) - np.nanmin(value) + aside * fastest)
+    for k in np.flatnonzero(np.abs(jumps) > least)[:1].tolist():
         yield _told_jump(block, word, float(times[k]), float(jumps[k]))
     changes = behind[:, 1] - before[:, 1]
     at_once = np.flatnonzero(np.abs(changes) > AT_ONCE * fastest)
     if at_once.size:
-        k = int(at_once[np.argmax(np.abs(changes[at_once]))])
-        more = f", and at {at_once.size - 1} more such times" if at_once.size > 1 else ""
-        yield (
-            f"{_called(block)} changes its rate by {changes[k]:.4g} {_unit(word)}/s at once at t = {times[k]:.6g} s{more}: "
-            "that takes an impulse, which no force, effort, power or work of the result holds; round the corner, as `smooth` "
-            "and `ramp` do, or let a table go on"
-        )
+        yield _told_rate(block, word, times[at_once], changes[at_once])
+
+
+def _told_rate(block: Block, word: Word, times: Array, changes: Array) -> str:
+    """Of all times [s] at which a rate changes at once the largest change, in words."""
+    k = int(np.argmax(np.abs(changes)))
+    more = f", and at {times.size - 1} more such times" if times.size > 1 else ""
+    return (
+        f"{_called(block)} changes its rate by {changes[k]:.4g} {_unit(word)}/s at once at t = {times[k]:.6g} s{more}: "
+        "that takes an impulse, which no force, effort, power or work of the result holds; round the corner, as `smooth` "
+        "and `ramp` do, or let a table go on"
+    )
 
 
 def _prescribed(word: Word, times: Array) -> Array:

@@ -72,28 +72,31 @@ def equations_of_motion(
     M, Q = _inertia_and_forces(now)
     rows = tuple(rows_at(scene, now.place, list(now.blocks), x, v, t))
     J, gamma = np.array([row.jacobian for row in rows]).reshape(-1, Q.size), np.array([row.gamma for row in rows])
-    v_dot, lam = solve(now.place, M, J, Q, gamma)
+    owners = np.repeat(np.arange(len(now.blocks)), [len(block.words) for block in now.blocks])
+    v_dot, lam = solve(now.place, M, J, Q, gamma, owners)
     return EquationsOfMotion(M, Q, rows, J, v_dot, lam)
 
 
-def solve(place: Layout, M: Array, J: Array, Q: Array, gamma: Array) -> tuple[Array, Array]:
+def solve(place: Layout, M: Array, J: Array, Q: Array, gamma: Array, owners: Array) -> tuple[Array, Array]:
     """v_dot (V,) and lam (C,) of M v_dot + J^T lam = Q, J v_dot = gamma.
+
+    owners : (C,) numbers of the joints that the rows belong to
 
     Equation (28) of docs/notation.md.
 
-    In the plane, coordinates across it stay zero. Where rows depend on one another the smallest multipliers are taken, each
-    times the root of what its row yields to a unit of it, J M^-1 J^T.
+    In the plane, coordinates across it stay zero. Where rows depend on one another the smallest multipliers are taken, those
+    of a joint times the root of what its rows yield to them, J M^-1 J^T.
     """
     moving = [place.iv[b] + c for b, n in enumerate(place.n) for c in (*place.active(b), *range(6, 6 + n))]
     M, J = M[np.ix_(moving, moving)], J[:, moving]
-    scale = np.sqrt(np.einsum("cv,vc->c", J, np.linalg.solve(M, J.T)))
-    J = J / scale[:, None]
-    system = np.block([[M, J.T], [J, np.zeros((scale.size, scale.size))]])
-    right = np.concatenate([Q[moving], gamma / scale])
+    root = np.linalg.cholesky(np.where(owners[:, None] == owners, J @ np.linalg.solve(M, J.T), 0.0))
+    J = np.linalg.solve(root, J)
+    system = np.block([[M, J.T], [J, np.zeros((owners.size, owners.size))]])
+    right = np.concatenate([Q[moving], np.linalg.solve(root, gamma)])
     solution = np.linalg.lstsq(system, right, rcond=None)[0]
     v_dot = np.zeros(Q.size)
     v_dot[moving] = solution[: len(moving)]
-    return v_dot, solution[len(moving) :] / scale
+    return v_dot, np.linalg.solve(root.T, solution[len(moving) :])
 
 
 def _inertia_and_forces(now: Instant) -> tuple[Array, Array]:

@@ -164,14 +164,10 @@ def _straight(kind: str, role: str, seen: Array) -> Array:
 def _put(scene: Scene, plane: Plane, hair: float) -> tuple[Scene, list[str]]:
     """The scene with the joints of a plane in it, and which were moved by so much that it is told."""
     size = max(_span(plane, b) for b in plane.normals)
-    wanted = {name: _aligned(held, plane.normals) for name, held in plane.joints.items()}
     off = {name: (c, up) for name, (c, up) in _too_low(plane).items() if abs(up) > ROUNDING * size}
-    for name, (c, up) in off.items():
-        b = _own_place(scene, plane.joints[name].joint, c)
-        if b is None or abs(up) > hair * size:
-            return scene, []  # no plane: what holds it strains it, or it does not close
-        place, higher = wanted[name][b], up if b == c else -up
-        wanted[name][b] = Place(place.point + higher * plane.normals[b], place.frame)
+    wanted = _wanted(scene, plane, off, hair * size)
+    if wanted is None:
+        return scene, []
     for name, held in plane.joints.items():
         scene = with_places(scene, held.joint, wanted[name])
     told = {name: abs(up) for name, (_, up) in off.items() if abs(up) > TOLD}
@@ -181,6 +177,19 @@ def _put(scene: Scene, plane: Plane, hair: float) -> tuple[Scene, list[str]]:
     hinges = [joint for joint in scene.joints if joint.name in plane.joints and plane.joints[joint.name].role == HINGE]
     scene, more = with_equal_twins(scene, hinges, plane.normals, BESIDE * size)
     return scene, notes + more
+
+
+def _wanted(scene: Scene, plane: Plane, off: dict[str, tuple[int, float]], near: float) -> dict[str, Places] | None:
+    """Where joints are in their plane; None where one is off it by more than a hair [m], and strains bodies or does not close,
+    or where others have its place."""
+    wanted = {name: _aligned(held, plane.normals) for name, held in plane.joints.items()}
+    for name, (c, up) in off.items():
+        b = _own_place(scene, plane.joints[name].joint, c)
+        if b is None or abs(up) > near:
+            return None
+        place, higher = wanted[name][b], up if b == c else -up
+        wanted[name][b] = Place(place.point + higher * plane.normals[b], place.frame)
+    return wanted
 
 
 def _span(plane: Plane, b: int) -> float:
