@@ -180,8 +180,8 @@ def _put(scene: Scene, plane: Plane, hair: float) -> tuple[Scene, list[str]]:
 
 
 def _wanted(scene: Scene, plane: Plane, off: dict[str, tuple[int, float]], near: float) -> dict[str, Places] | None:
-    """Where joints are in their plane; None where one is off it by more than a hair [m], and strains bodies or does not close,
-    or where others have its place."""
+    """Where joints are in their plane; None where one is off it by more than a hair [m], and strains bodies or does not
+    close, or where others have its place."""
     wanted = {name: _aligned(held, plane.normals) for name, held in plane.joints.items()}
     for name, (c, up) in off.items():
         b = _own_place(scene, plane.joints[name].joint, c)

@@ -39,17 +39,25 @@ def with_equal_twins(
     lines = _lines(at, near)
     if len(set(lines.values())) == len(lines):
         return scene, []
-    own, moves = _own(scene, hinges), At()
+    own = _own(scene, hinges)
+    moves = _moves(at, lines, own, near)
+    return _moved(scene, hinges, moves) if own.issuperset(moves) else (scene, [])
+
+
+def _moves(at: At, lines: dict[str, str], own: set[tuple[str, int]], near: float) -> At:
+    """How hinges move onto their lines, and links then become equally long; none where a shaft has bearings out of line."""
+    moves = At()
     for key, move in _onto_lines(at, lines):
         if float(np.linalg.norm(move)) > near:
-            return scene, []  # a shaft whose bearings are not in line
+            return At()
         moves[key] = move
-        at[key] = at[key] + move
-    for keys, move in _to_equal_length(at, lines, own, near):
+    there = {key: place + moves.get(key, 0.0) for key, place in at.items()}
+    for keys, move in _to_equal_length(there, lines, own, near):
         if moves.keys().isdisjoint(keys):
             moves |= dict.fromkeys(keys, move)
-    moves = {key: move for key, move in moves.items() if np.abs(move).max() > ROUNDING * float(np.linalg.norm(at[key]))}
-    return _moved(scene, hinges, moves) if own.issuperset(moves) else (scene, [])
+    return {
+        key: move for key, move in moves.items() if np.abs(move).max() > ROUNDING * float(np.linalg.norm(there[key]))
+    }
 
 
 def _lines(at: At, near: float) -> dict[str, str]:
