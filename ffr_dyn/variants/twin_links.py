@@ -39,8 +39,7 @@ def with_equal_twins(
     lines = _lines(at, near)
     if len(set(lines.values())) == len(lines):
         return scene, []
-    own = _own(scene, hinges)
-    moves = _moves(at, lines, own, near)
+    moves = _moves(at, lines, own := _own(scene, hinges), near)
     return _moved(scene, hinges, moves) if own.issuperset(moves) else (scene, [])
 
 
