@@ -29,7 +29,7 @@ from ffr_dyn.results.stress import (
 )
 from ffr_dyn.results.stress_error import stress_error
 from ffr_dyn.results.wholes import with_wholes
-from ffr_dyn.scene.stress_sensors import measure, nearest_element
+from ffr_dyn.scene.stress_sensors import Measure, measure, nearest_element
 from ffr_prep.body import Surface
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
@@ -123,14 +123,17 @@ def _errors(result: Result, bodies: Sequence[str]) -> Iterator[tuple[str, tuple[
             yield name, (error, float(peaks(result, name)[0].max()))
 
 
-def report_lines(report: StressReport) -> Iterator[str]:
+def report_lines(report: StressReport) -> list[str]:
     """The report in words.
 
     Raises InputError for a report of an unknown measure.
 
     >>> print(*fd.report_lines(report), sep="\\n")  # of what `fd.stress_report` returned
     """
-    of = measure(report.quantity)
+    return [*_lines(report, measure(report.quantity))]
+
+
+def _lines(report: StressReport, of: Measure) -> Iterator[str]:
     factor, unit = readable(of.unit, abs(report.spots[0].value))
     yield f"hot spots   {of.words} [{unit or '1'}], place in the body frame [m], time [s]"
     width = max(len(spot.body) for spot in report.spots)
