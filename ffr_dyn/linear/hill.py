@@ -150,10 +150,26 @@ def _centred(values: Array, parts: Array, shift: float) -> tuple[Array, Array]:
 
 def one_of_each(values: Array, shift: float) -> Array:
     """Numbers of one eigenvalue (m,) of each pair: of conjugates that with the positive frequency; of those that are
-    their own conjugates, but for multiples of the shift, the larger half."""
+    their own conjugates, but for multiples of the shift, the larger half.
+
+    A pair of conjugates a multiple of the shift apart looks like two of those. It lies at half of that multiple, so halves are
+    taken of what lies at each; what is left alone there has its other half at another numbering.
+    """
     near = SAME * max(float(np.abs(values).max(initial=0.0)), shift) if shift else 0.0
     twice = 2 * values.imag
-    alone = np.abs(twice - shift * np.round(twice / (shift or 1.0))) <= near
-    real = np.flatnonzero(alone)
-    real = real[np.lexsort((values[real].imag, values[real].real))][len(real) // 2 :]
-    return np.concatenate([np.flatnonzero((values.imag > 0) & ~alone), real])
+    turns = np.round(twice / (shift or 1.0))
+    alone = np.abs(twice - shift * turns) <= near
+    places = np.where(shift, np.abs(turns), 0.0)
+    odd = [place for place in np.unique(places[alone]) if (alone & (places == place)).sum() % 2]
+    places = np.where(np.isin(places, odd), -1.0 - places % 2, places)
+    return np.concatenate(
+        [
+            np.flatnonzero((values.imag > 0) & ~alone),
+            *(_larger_half(values, np.flatnonzero(alone & (places == one))) for one in np.unique(places[alone])),
+        ]
+    ).astype(int)
+
+
+def _larger_half(values: Array, numbers: Array) -> Array:
+    found: Array = numbers[np.lexsort((values[numbers].imag, values[numbers].real))][len(numbers) // 2 :]
+    return found

@@ -1,8 +1,8 @@
 """Campbell diagrams: frequencies and damping of a turning scene over its speed, critical speeds, limits of stability.
 
 The steady motion at each speed begins where the last one ended; its vibrations are followed by their shapes
-(`ffr_dyn.linear.spectrum`). Where a frequency crosses a multiple of the speed, or a vibration begins to grow, is found by the
-by Brent's method on steady motions in between.
+(`ffr_dyn.linear.spectrum`). Where a frequency crosses a multiple of the speed, or a vibration begins to grow, is found by by
+Brent's method on steady motions in between.
 """
 
 from __future__ import annotations
@@ -33,6 +33,7 @@ from ffr_prep.common.progress import no_count
 
 MODES = 10
 MET = 1e-8  # of the speed of a crossing, relative to the range
+LEAPS = 2e-3  # of the speed: what a frequency is off its order at a crossing that is none
 
 Row = tuple[float, Spectrum]
 AtSpeed = Callable[[float, Row | None], Spectrum]
@@ -282,20 +283,38 @@ def _crossings(at: AtSpeed, rows: Sequence[Row], m: int, measure: Measure) -> li
     ]
     for k, next_ in pairwise(there):
         if measured[k] * measured[next_] < 0:
-            found.append(_between(at, rows[k], rows[k + 1], m, measure) if next_ == k + 1 else rows[k + 1][0])
+            found += _met(at, rows[k], rows[k + 1], m, measure) if next_ == k + 1 else [rows[k + 1][0]]
     return sorted(found)
 
 
+def _met(at: AtSpeed, one: Row, other: Row, m: int, measure: Measure) -> list[float]:
+    """Speeds between two rows where a measure passes zero; not where it leaps across, as where one vibration takes the shape
+    of another in the turning axes, and from forward to backward from the ground."""
+    speed, known = _sought(at, one, other, m, measure)
+    values = {row[0]: measure(*row, m) for row in known}
+    reach = 2 * MET * abs(other[0] - one[0])
+    if min(abs(value) for at_, value in values.items() if abs(at_ - speed) <= reach) <= LEAPS * abs(speed):
+        return [speed]
+    pairs = list(pairwise(sorted(known, key=lambda row: row[0])))
+    left = [(a, b) for a, b in pairs if values[a[0]] * values[b[0]] < 0 and not a[0] <= speed <= b[0]]
+    return [met for a, b in left for met in _met(at, a, b, m, measure)]
+
+
 def _between(at: AtSpeed, one: Row, other: Row, m: int, measure: Measure) -> float:
-    """By Brent's method, following the vibration from the nearest speed that is known."""
+    return _sought(at, one, other, m, measure)[0]
+
+
+def _sought(at: AtSpeed, one: Row, other: Row, m: int, measure: Measure) -> tuple[float, list[Row]]:
+    """By Brent's method, following the vibration from the nearest speed that is known; and the rows that are known then."""
     known = [one, other]
 
     def measured(speed: float) -> float:
         row = _row_at(at, known, speed)
-        known.append(row)
+        if row[0] not in (one[0] for one in known):
+            known.append(row)
         return measure(*row, m)
 
-    return float(brentq(measured, one[0], other[0], xtol=MET * abs(other[0] - one[0])))
+    return float(brentq(measured, one[0], other[0], xtol=MET * abs(other[0] - one[0]))), known
 
 
 # ---- as a result ----------------------------------------------------------------------------------------------------

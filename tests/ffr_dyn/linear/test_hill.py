@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import ffr_dyn as fd
-from ffr_dyn.linear.hill import Varying, hill
+from ffr_dyn.linear.hill import Varying, hill, one_of_each
 from ffr_dyn.linear.matrices import CUT
 
 MASS, ACROSS, ALONG, ENDS = 10.0, 0.5, 0.9, (-0.2, 0.3)  # kg, kg m^2, m
@@ -68,6 +68,16 @@ def test_critical_speeds_in_unlike_bearings():
     for speed in critical:
         assert np.abs(at_rest(speed, 0.0).imag - speed).min() < 1e-5 * speed
     assert (np.abs(np.diff(np.abs(found["seen"]), axis=0)) < 20).all()
+
+
+def test_a_vibration_half_as_fast_as_the_bearings_change_is_not_lost_beside_real_eigenvalues():
+    """One of each pair is told, at whichever numbering its halves are."""
+    slow = [2e-4, -2e-4]
+    for turns, other in ((1, 1), (2, 2), (2, -2)):
+        values = np.array([-4.5 + 1j * turns, -4.5 + 1j * other, *slow, -3 + 0.7j, -3 - 0.7j])
+        assert sorted(values[one_of_each(values, 2.0)].real) == [-4.5, -3, 2e-4]
+    apart = np.array([1e-3 + 1j, -1e-3 + 3j, *slow])  # a real multiplier and its inverse, in two numberings
+    assert sorted(apart[one_of_each(apart, 2.0)].real) == [2e-4, 1e-3]
 
 
 @pytest.mark.slow
