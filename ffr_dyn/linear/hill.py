@@ -150,24 +150,22 @@ def _centred(values: Array, parts: Array, shift: float) -> tuple[Array, Array]:
 
 def one_of_each(values: Array, shift: float) -> Array:
     """Numbers of one eigenvalue (m,) of each pair: of conjugates that with the positive frequency; of those that are
-    their own conjugates, but for multiples of the shift, the larger half.
-
-    A pair of conjugates a multiple of the shift apart looks like two of those. It lies at half of that multiple, so halves are
-    taken of what lies at each; what is left alone there has its other half at another numbering.
-    """
+    their own conjugates, but for multiples of the shift, the larger half of those at each place."""
     near = SAME * max(float(np.abs(values).max(initial=0.0)), shift) if shift else 0.0
-    twice = 2 * values.imag
-    turns = np.round(twice / (shift or 1.0))
-    alone = np.abs(twice - shift * turns) <= near
-    places = np.where(shift, np.abs(turns), 0.0)
-    odd = [place for place in np.unique(places[alone]) if (alone & (places == place)).sum() % 2]
-    places = np.where(np.isin(places, odd), -1.0 - places % 2, places)
-    return np.concatenate(
-        [
-            np.flatnonzero((values.imag > 0) & ~alone),
-            *(_larger_half(values, np.flatnonzero(alone & (places == one))) for one in np.unique(places[alone])),
-        ]
-    ).astype(int)
+    turns = np.round(2 * values.imag / (shift or 1.0))
+    alone = np.abs(2 * values.imag - shift * turns) <= near
+    places = _places(np.abs(turns) if shift else 0 * turns, alone)
+    halves = [_larger_half(values, np.flatnonzero(places == one)) for one in np.unique(places[alone])]
+    return np.concatenate([np.flatnonzero((values.imag > 0) & ~alone), *halves])
+
+
+def _places(turns: Array, alone: Array) -> Array:
+    """(m,) where eigenvalues are that seem to be their own conjugates; nan of others. A pair of conjugates that is a multiple
+    of the shift apart is at half of it, both at one place; what is alone there has its other half at another numbering."""
+    places = np.where(alone, turns, np.nan)
+    odd = [one for one in np.unique(turns[alone]) if (places == one).sum() % 2]
+    found: Array = np.where(np.isin(places, odd), -1.0 - places % 2, places)
+    return found
 
 
 def _larger_half(values: Array, numbers: Array) -> Array:

@@ -291,13 +291,16 @@ def _met(at: AtSpeed, one: Row, other: Row, m: int, measure: Measure) -> list[fl
     """Speeds between two rows where a measure passes zero; not where it leaps across, as where one vibration takes the shape
     of another in the turning axes, and from forward to backward from the ground."""
     speed, known = _sought(at, one, other, m, measure)
-    values = {row[0]: measure(*row, m) for row in known}
-    reach = 2 * MET * abs(other[0] - one[0])
-    if min(abs(value) for at_, value in values.items() if abs(at_ - speed) <= reach) <= LEAPS * abs(speed):
+    near = sorted(known, key=lambda row: abs(row[0] - speed))[:2]
+    if min(abs(measure(*row, m)) for row in near) <= LEAPS * abs(speed):
         return [speed]
-    pairs = list(pairwise(sorted(known, key=lambda row: row[0])))
-    left = [(a, b) for a, b in pairs if values[a[0]] * values[b[0]] < 0 and not a[0] <= speed <= b[0]]
-    return [met for a, b in left for met in _met(at, a, b, m, measure)]
+    pairs = pairwise(sorted(known, key=lambda row: row[0]))
+    left = [pair for pair in pairs if not pair[0][0] <= speed <= pair[1][0] and _differ(*pair, m, measure)]
+    return [met for pair in left for met in _met(at, *pair, m, measure)]
+
+
+def _differ(one: Row, other: Row, m: int, measure: Measure) -> bool:
+    return measure(*one, m) * measure(*other, m) < 0
 
 
 def _between(at: AtSpeed, one: Row, other: Row, m: int, measure: Measure) -> float:
@@ -310,8 +313,7 @@ def _sought(at: AtSpeed, one: Row, other: Row, m: int, measure: Measure) -> tupl
 
     def measured(speed: float) -> float:
         row = _row_at(at, known, speed)
-        if row[0] not in (one[0] for one in known):
-            known.append(row)
+        known.extend([row] if speed not in [one[0] for one in known] else [])
         return measure(*row, m)
 
     return float(brentq(measured, one[0], other[0], xtol=MET * abs(other[0] - one[0]))), known
