@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -57,6 +59,21 @@ def test_along_the_axis_nothing_is_added_to_a_frequency():
     found = fd.linearise(rotor(200.0))
     (axial,) = found.seen[(found.eigenvalues.imag > 0) & np.isnan(found.whirl)]
     assert axial == pytest.approx(np.sqrt(AXIAL / MASS) / (2 * np.pi), rel=1e-9)
+
+
+@pytest.mark.parametrize(("off", "told"), [(1e-8, 0), (1e-5, 1)])
+def test_the_weight_of_a_rotor_with_a_little_unbalance_does_not_keep_it_from_resting(off, told):
+    """Each bearing carries its share of the weight by the lever, and gives by that over its stiffness."""
+    points = dict(zip(("left", "right"), ((0.0, 0.0, z) for z in ENDS), strict=True))
+    of = {"mass": MASS, "inertia": (ACROSS, ACROSS, ALONG), "centre_of_mass": (off, 0, 0), "points": points}
+    disc = fd.rigid_body("disc", **of)
+    scene = rotor(1.0)
+    scene = replace(scene, bodies=(replace(scene.bodies[0], model=disc),), gravity=(0, -9.81, 0))
+    found = fd.steady(scene, speeds=(0.0, 100.0), outputs=("disc.left.position",))
+    share = ENDS[1] / (ENDS[1] - ENDS[0])
+    assert found["disc.left.position"][0, 1] == pytest.approx(-MASS * 9.81 * share / STIFF[1], rel=1e-3)
+    assert sum("it is held there" in note for note in found.attributes["notes"]) == told
+    assert found["disc.left.position"][1, 1] == pytest.approx(0.0, abs=10 * off)
 
 
 @pytest.mark.slow
