@@ -25,6 +25,7 @@ PRESENT = 1e-7  # of a harmonic, relative to the means of both coordinates: no r
 RESIDUAL = 1e-8  # of the equations beyond the last harmonic, relative
 HARMONICS = (*range(1, 9), 12, 16, 24, 32, 48)  # on either side
 ANYHOW, LARGEST = 8, 800  # harmonics of any machine; rows of a determinant with more
+STILL = 1e-10  # of a frequency relative to the largest: of what stands still in the turning axes, by rounding
 SAME, ALIKE = 1e-6, 0.5  # of eigenvalues and shapes of one mode that is found twice
 
 
@@ -143,7 +144,8 @@ def _centred(values: Array, parts: Array, shift: float) -> tuple[Array, Array]:
         large = np.flatnonzero(sizes[:, m] >= sizes[:, m].max() - SAME) - h
         rates = value.imag + shift * large
         turns = int(large[np.lexsort((rates < 0, np.round(np.abs(rates) / near)))[0]])
-        found.append(value + 1j * shift * turns)
+        rate = value.imag + shift * turns
+        found.append(complex(value.real, rate if abs(rate) > STILL * near / SAME else 0.0))
         moved.append(moved_on(wide[..., [m]], turns))
     return np.array(found), np.concatenate(moved, axis=2)
 

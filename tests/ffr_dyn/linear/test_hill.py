@@ -119,6 +119,18 @@ def test_where_hills_determinant_is_unstable_mathieus_equation_is():
     assert np.abs(found.values.imag) == pytest.approx([0.5, 0.5])
 
 
+def test_what_grows_and_stands_still_in_the_turning_axes_has_real_eigenvalues():
+    """Of a disc on a flat shaft, with a little that varies: by that `campbell` knows the range in which it is unstable."""
+    k, other = np.array([1e4, 1.21e4]), np.array([[3.0, 1.0], [1.0, 2.0]])
+    for speed in (102.0, 105.0, 108.0):
+        C = np.array([[[0, -2 * speed], [2 * speed, 0]], np.zeros((2, 2))], complex)
+        found = hill(Varying(np.array([np.diag(k - speed**2), (1 + 0.3j) * other]), C, speed))
+        (grown,) = np.flatnonzero(found.values.real > 1)
+        square = speed**2 + k.mean() - np.sqrt(4 * speed**2 * k.mean() + (np.diff(k)[0] / 2) ** 2)
+        assert found.values[grown].real == pytest.approx(np.sqrt(-square), rel=1e-3)
+        assert found.values[grown].imag == 0
+
+
 @pytest.mark.parametrize("slow", [0.3, 0.05, 0.02])
 def test_what_changes_slowly_takes_many_harmonics(slow):
     """y'' + (1 + 0.4 cos(w t)) y = 0, by its map over a turn."""
