@@ -9,7 +9,7 @@ import pytest
 
 import ffr_dyn as fd
 import ffr_prep as fp
-from ffr_dyn.analyses.rotating.campbell import _at_speeds, _off_order
+from ffr_dyn.analyses.rotating.campbell import _at_speeds, _crossings, _off_order
 from ffr_dyn.linear.spectrum import followed
 
 
@@ -171,6 +171,18 @@ def test_a_rotor_that_is_geared_to_a_faster_one_has_its_own_critical_speed(ratio
     assert [one[2] for one in told] == pytest.approx([100, 100, 100 / 3, 100 / 3, 80, 80], rel=1e-7)
 
 
+def test_a_measure_that_leaps_across_zero_crosses_it_only_where_it_passes(monkeypatch):
+    monkeypatch.setattr("ffr_dyn.analyses.rotating.campbell.followed", lambda before, now: now)
+    rows = [(speed, None) for speed in (100.0, 200.0)]
+    for values, speeds in (
+        (lambda speed: 50.0 if speed < 130 else -50.0, []),
+        (lambda speed: speed - 120, [120.0]),
+    ):
+        found = _crossings(lambda speed, near: None, rows, 0, lambda speed, one, m, of=values: of(speed))
+        assert found == pytest.approx(speeds, rel=1e-7)
+
+
+@pytest.mark.slow
 def test_where_a_whirl_takes_the_shape_of_another_is_no_critical_speed():
     """Of two discs on a flat shaft the first backward and the second forward whirl meet in the turning axes, and turn into
     each other: from the ground the frequency leaps across the speed. No root of the equations in turning axes lies there."""
