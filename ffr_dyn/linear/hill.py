@@ -25,6 +25,7 @@ PRESENT = 1e-7  # of a harmonic, relative to the means of both coordinates: no r
 RESIDUAL = 1e-8  # of the equations beyond the last harmonic, relative
 HARMONICS = (*range(1, 9), 12, 16, 24, 32, 48)  # on either side
 ANYHOW, LARGEST = 8, 800  # harmonics of any machine; rows of a determinant with more
+STILL = 1e-10  # of a frequency relative to the largest: of what stands still in the turning axes, by rounding
 SAME, ALIKE = 1e-6, 0.5  # of eigenvalues and shapes of one mode that is found twice
 
 
@@ -143,17 +144,32 @@ def _centred(values: Array, parts: Array, shift: float) -> tuple[Array, Array]:
         large = np.flatnonzero(sizes[:, m] >= sizes[:, m].max() - SAME) - h
         rates = value.imag + shift * large
         turns = int(large[np.lexsort((rates < 0, np.round(np.abs(rates) / near)))[0]])
-        found.append(value + 1j * shift * turns)
+        rate = value.imag + shift * turns
+        found.append(complex(value.real, rate if abs(rate) > STILL * near / SAME else 0.0))
         moved.append(moved_on(wide[..., [m]], turns))
     return np.array(found), np.concatenate(moved, axis=2)
 
 
 def one_of_each(values: Array, shift: float) -> Array:
     """Numbers of one eigenvalue (m,) of each pair: of conjugates that with the positive frequency; of those that are
-    their own conjugates, but for multiples of the shift, the larger half."""
+    their own conjugates, but for multiples of the shift, the larger half of those at each place."""
     near = SAME * max(float(np.abs(values).max(initial=0.0)), shift) if shift else 0.0
-    twice = 2 * values.imag
-    alone = np.abs(twice - shift * np.round(twice / (shift or 1.0))) <= near
-    real = np.flatnonzero(alone)
-    real = real[np.lexsort((values[real].imag, values[real].real))][len(real) // 2 :]
-    return np.concatenate([np.flatnonzero((values.imag > 0) & ~alone), real])
+    turns = np.round(2 * values.imag / (shift or 1.0))
+    alone = np.abs(2 * values.imag - shift * turns) <= near
+    places = _places(np.abs(turns) if shift else 0 * turns, alone)
+    halves = [_larger_half(values, np.flatnonzero(places == one)) for one in np.unique(places[alone])]
+    return np.concatenate([np.flatnonzero((values.imag > 0) & ~alone), *halves])
+
+
+def _places(turns: Array, alone: Array) -> Array:
+    """(m,) where eigenvalues are that seem to be their own conjugates; nan of others. A pair of conjugates that is a multiple
+    of the shift apart is at half of it, both at one place; what is alone there has its other half at another numbering."""
+    places = np.where(alone, turns, np.nan)
+    odd = [one for one in np.unique(turns[alone]) if (places == one).sum() % 2]
+    found: Array = np.where(np.isin(places, odd), -1.0 - places % 2, places)
+    return found
+
+
+def _larger_half(values: Array, numbers: Array) -> Array:
+    found: Array = numbers[np.lexsort((values[numbers].imag, values[numbers].real))][len(numbers) // 2 :]
+    return found

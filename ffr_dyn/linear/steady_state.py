@@ -483,8 +483,17 @@ def nearly_balanced(machine: Machine, x: Array) -> Steady:
     return found
 
 
-def _newton(machine: Machine, x: Array) -> Steady | None:
-    """The steady motion near x, None where the steps do not come to an end."""
+def held_at_rest(machine: Machine, x: Array) -> Steady:
+    """Where a machine rests that little turns, and nothing holds, as the weight of a rotor in bearings that is not quite
+    balanced: it is held there. Raises LeapError where it is no little, and where nothing is found."""
+    found = None if machine.screws.fastest else _newton(machine, x, NEARLY)
+    if found is None:
+        raise LeapError
+    return found
+
+
+def _newton(machine: Machine, x: Array, unbalanced: float = UNBALANCED) -> Steady | None:
+    """The steady motion near x, None where the steps do not come to an end; with no more `unbalanced` of the forces."""
     place, size = machine.place, sizes_of(machine.system)
     about, lengths = _at(machine, x).about, list[float]()
     for count in range(1, ITERATIONS + 1):
@@ -503,7 +512,7 @@ def _newton(machine: Machine, x: Array) -> Steady | None:
         about = matrices(machine, x, lam)
         if length < TOLERANCE or (length < STALLED and length > 0.5 * min(lengths[:-1], default=np.inf)):
             steady = replace(steady, x=x, v=velocities(place, machine.screws, x), about=about)
-            _require_balance(steady)
+            _require_balance(steady, unbalanced)
             return steady
     return None
 
@@ -563,7 +572,7 @@ def _neutral(near: Steady, values: Array) -> float:
     return NEUTRAL * max(float(values.max(initial=0.0)), near.machine.screws.fastest**2)
 
 
-def _require_balance(found: Steady) -> None:
+def _require_balance(found: Steady, unbalanced: float) -> None:
     """InputError where forces act along a motion that nothing holds: it speeds up or slows down."""
     about, Z = found.about, found.Z
     left = Z.T @ about.forces
@@ -571,7 +580,7 @@ def _require_balance(found: Steady) -> None:
     g, complete = _turning_on(found)
     loose = np.concatenate([U[:, values <= _neutral(found, values)], complete[:, :g]], axis=1)
     along = loose.T @ left
-    if np.abs(along).max(initial=0.0) <= UNBALANCED * _size_of_forces(found):
+    if np.abs(along).max(initial=0.0) <= unbalanced * _size_of_forces(found):
         return
     system = found.machine.system
     motion = named_motion(system.scene, system.layout, found.x, Z @ loose @ along)
@@ -582,11 +591,14 @@ def _require_balance(found: Steady) -> None:
 
 
 def _size_of_forces(found: Steady) -> float:
-    """Of all forces, or of those that would hold the scene's mass at its size from the axis; in the free motions' units."""
+    """Of all forces, of the weight that they may balance, or of those that would hold the scene's mass at its size from the
+    axis; in the free motions' units."""
     about, machine = found.about, found.machine
+    mass, place = np.sqrt(np.diag(about.M)), machine.place
     applied = np.abs(of_mass(about.M, about.forces)).max()
-    held = machine.screws.fastest**2 * (sizes_of(machine.system) * np.sqrt(np.diag(about.M))).max()
-    return float(max(applied, held)) or 1.0
+    weight = np.linalg.norm(machine.system.scene.gravity) * max(mass[place.R_dot(b)].max() for b in range(len(place.n)))
+    held = machine.screws.fastest**2 * (sizes_of(machine.system) * mass).max()
+    return float(max(applied, weight, held)) or 1.0
 
 
 # ---- the same at every angle ----------------------------------------------------------------------------------------

@@ -1,8 +1,8 @@
 """Campbell diagrams: frequencies and damping of a turning scene over its speed, critical speeds, limits of stability.
 
 The steady motion at each speed begins where the last one ended; its vibrations are followed by their shapes
-(`ffr_dyn.linear.spectrum`). Where a frequency crosses a multiple of the speed, or a vibration begins to grow, is found by the
-by Brent's method on steady motions in between.
+(`ffr_dyn.linear.spectrum`). Where a frequency crosses a multiple of the speed, or a vibration begins to grow, is found by by
+Brent's method on steady motions in between.
 """
 
 from __future__ import annotations
@@ -33,6 +33,7 @@ from ffr_prep.common.progress import no_count
 
 MODES = 10
 MET = 1e-8  # of the speed of a crossing, relative to the range
+LEAPS = 2e-3  # of the speed: what a frequency is off its order at a crossing that is none
 
 Row = tuple[float, Spectrum]
 AtSpeed = Callable[[float, Row | None], Spectrum]
@@ -282,20 +283,40 @@ def _crossings(at: AtSpeed, rows: Sequence[Row], m: int, measure: Measure) -> li
     ]
     for k, next_ in pairwise(there):
         if measured[k] * measured[next_] < 0:
-            found.append(_between(at, rows[k], rows[k + 1], m, measure) if next_ == k + 1 else rows[k + 1][0])
+            found += _met(at, rows[k], rows[k + 1], m, measure) if next_ == k + 1 else [rows[k + 1][0]]
     return sorted(found)
 
 
+def _met(at: AtSpeed, one: Row, other: Row, m: int, measure: Measure) -> list[float]:
+    """Speeds between two rows where a measure passes zero; not where it leaps across, as where one vibration takes the shape
+    of another in the turning axes, and from forward to backward from the ground."""
+    speed, known = _sought(at, one, other, m, measure)
+    near = sorted(known, key=lambda row: abs(row[0] - speed))[:2]
+    if min(abs(measure(*row, m)) for row in near) <= LEAPS * abs(speed):
+        return [speed]
+    pairs = pairwise(sorted(known, key=lambda row: row[0]))
+    left = [pair for pair in pairs if not pair[0][0] <= speed <= pair[1][0] and _differ(*pair, m, measure)]
+    return [met for pair in left for met in _met(at, *pair, m, measure)]
+
+
+def _differ(one: Row, other: Row, m: int, measure: Measure) -> bool:
+    return measure(*one, m) * measure(*other, m) < 0
+
+
 def _between(at: AtSpeed, one: Row, other: Row, m: int, measure: Measure) -> float:
-    """By Brent's method, following the vibration from the nearest speed that is known."""
+    return _sought(at, one, other, m, measure)[0]
+
+
+def _sought(at: AtSpeed, one: Row, other: Row, m: int, measure: Measure) -> tuple[float, list[Row]]:
+    """By Brent's method, following the vibration from the nearest speed that is known; and the rows that are known then."""
     known = [one, other]
 
     def measured(speed: float) -> float:
         row = _row_at(at, known, speed)
-        known.append(row)
+        known.extend([row] if speed not in [one[0] for one in known] else [])
         return measure(*row, m)
 
-    return float(brentq(measured, one[0], other[0], xtol=MET * abs(other[0] - one[0])))
+    return float(brentq(measured, one[0], other[0], xtol=MET * abs(other[0] - one[0]))), known
 
 
 # ---- as a result ----------------------------------------------------------------------------------------------------

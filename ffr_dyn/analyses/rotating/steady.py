@@ -21,7 +21,7 @@ from ffr_dyn.consistency.doubts import checked
 from ffr_dyn.consistency.evaluation import evaluator, joined, record_states
 from ffr_dyn.linear.spectrum import Spectrum, spectrum
 from ffr_dyn.linear.speeds import at_speed, speed_list
-from ffr_dyn.linear.steady_state import LeapError, from_rest, nearby, nearly_balanced, steady_state
+from ffr_dyn.linear.steady_state import LeapError, from_rest, held_at_rest, nearby, nearly_balanced, steady_state
 from ffr_dyn.linear.steady_state import Steady as Found
 from ffr_dyn.results.quantities import selected
 from ffr_dyn.results.result import Quantity, Result
@@ -174,7 +174,7 @@ def followed_to(
     Speeds between are taken then, and a note tells where it leaps all the same.
     """
     if last is None or last[0] == speed:
-        return _at(scene, speed, turn, time, last and last[1].x)
+        return _first(scene, speed, turn, time, last and last[1].x)
     here, found = last
     step, least = speed - here, abs(speed - here) / CLOSEST
     while True:
@@ -190,6 +190,24 @@ def followed_to(
             return near
         else:
             here, found, step = goal, near[1], 2 * step
+
+
+def _first(scene: Scene, speed: float, turn: str, time: float, start: Array | None) -> tuple[Assembled, Found]:
+    """At the first speed [rad/s]; at rest held where its weight would turn it a little, which is no more once it turns."""
+    try:
+        return _at(scene, speed, turn, time, start)
+    except InputError:
+        try:
+            assembled, found = _at(scene, speed, turn, time, start, held_at_rest)
+        except (InputError, LeapError):
+            found = None
+        if found is None:
+            raise
+    note = (
+        "at rest, forces such as the weight of what is not quite balanced turn what nothing drives: it is held there, as at "
+        "speeds, over whose turns they are a mean"
+    )
+    return assembled, replace(found, notes=(note, *found.notes))
 
 
 def held_near(

@@ -9,7 +9,7 @@ import pytest
 
 import ffr_dyn as fd
 import ffr_prep as fp
-from ffr_dyn.analyses.rotating.campbell import _at_speeds, _off_order
+from ffr_dyn.analyses.rotating.campbell import _at_speeds, _crossings, _off_order
 from ffr_dyn.linear.spectrum import followed
 
 
@@ -169,3 +169,30 @@ def test_a_rotor_that_is_geared_to_a_faster_one_has_its_own_critical_speed(ratio
     told = sorted((one["order"], one["mode"][:5], one["speed"]) for one in found)
     assert [one[:2] for one in told] == [(1, "discA")] * 2 + [(3, "discA")] * 2 + [(3, "discB")] * 2
     assert [one[2] for one in told] == pytest.approx([100, 100, 100 / 3, 100 / 3, 80, 80], rel=1e-7)
+
+
+def test_a_measure_that_leaps_across_zero_crosses_it_only_where_it_passes(monkeypatch):
+    monkeypatch.setattr("ffr_dyn.analyses.rotating.campbell.followed", lambda before, now: now)
+    rows = [(speed, None) for speed in (100.0, 200.0)]
+    for values, speeds in (
+        (lambda speed: 50.0 if speed < 130 else -50.0, []),
+        (lambda speed: speed - 120, [120.0]),
+    ):
+        found = _crossings(lambda speed, near: None, rows, 0, lambda speed, one, m, of=values: of(speed))
+        assert found == pytest.approx(speeds, rel=1e-7)
+
+
+@pytest.mark.slow
+def test_where_a_whirl_takes_the_shape_of_another_is_no_critical_speed():
+    """Of two discs on a flat shaft the first backward and the second forward whirl meet in the turning axes, and turn into
+    each other: from the ground the frequency leaps across the speed. No root of the equations in turning axes lies there."""
+    near, far = (1e4, 1.6e4), 2e5
+    scene = jeffcott(near)
+    between = fd.Bushing("between", "disc.c", "outer.c", (far, far, 1e6, 1e3, 1e3, 1e3))
+    bodies = (*scene.bodies, replace(scene.bodies[1], name="outer"))
+    found = fd.campbell(replace(scene, bodies=bodies, forces=(*scene.forces, between)), speeds=(200, 240, 280))
+    leaps = np.abs(np.diff(np.abs(found["seen"]) * 2 * np.pi, axis=0)) > 200
+    assert leaps.any()
+    roots = [np.sqrt(np.linalg.eigvalsh([[k + far, -far], [-far, far]])) for k in near]
+    assert not any(((root > 200) & (root < 280)).any() for root in roots)
+    assert found.attributes["critical"] == []

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
 import ffr_dyn as fd
-from ffr_dyn.linear.hill import Varying, hill
+from ffr_dyn.linear.hill import Varying, hill, one_of_each
 from ffr_dyn.linear.matrices import CUT
 
 MASS, ACROSS, ALONG, ENDS = 10.0, 0.5, 0.9, (-0.2, 0.3)  # kg, kg m^2, m
@@ -59,6 +61,21 @@ def test_along_the_axis_nothing_is_added_to_a_frequency():
     assert axial == pytest.approx(np.sqrt(AXIAL / MASS) / (2 * np.pi), rel=1e-9)
 
 
+@pytest.mark.parametrize(("off", "told"), [(1e-8, 0), (1e-5, 1)])
+def test_the_weight_of_a_rotor_with_a_little_unbalance_does_not_keep_it_from_resting(off, told):
+    """Each bearing carries its share of the weight by the lever, and gives by that over its stiffness."""
+    points = dict(zip(("left", "right"), ((0.0, 0.0, z) for z in ENDS), strict=True))
+    of = {"mass": MASS, "inertia": (ACROSS, ACROSS, ALONG), "centre_of_mass": (off, 0, 0), "points": points}
+    disc = fd.rigid_body("disc", **of)
+    scene = rotor(1.0)
+    scene = replace(scene, bodies=(replace(scene.bodies[0], model=disc),), gravity=(0, -9.81, 0))
+    found = fd.steady(scene, speeds=(0.0, 100.0), outputs=("disc.left.position",))
+    share = ENDS[1] / (ENDS[1] - ENDS[0])
+    assert found["disc.left.position"][0, 1] == pytest.approx(-MASS * 9.81 * share / STIFF[1], rel=1e-3)
+    assert sum("it is held there" in note for note in found.attributes["notes"]) == told
+    assert found["disc.left.position"][1, 1] == pytest.approx(0.0, abs=10 * off)
+
+
 @pytest.mark.slow
 def test_critical_speeds_in_unlike_bearings():
     """Where the speed is one of the eigenvalues in axes at rest; followed through rest, where the axes coincide."""
@@ -68,6 +85,16 @@ def test_critical_speeds_in_unlike_bearings():
     for speed in critical:
         assert np.abs(at_rest(speed, 0.0).imag - speed).min() < 1e-5 * speed
     assert (np.abs(np.diff(np.abs(found["seen"]), axis=0)) < 20).all()
+
+
+def test_a_vibration_half_as_fast_as_the_bearings_change_is_not_lost_beside_real_eigenvalues():
+    """One of each pair is told, at whichever numbering its halves are."""
+    slow = [2e-4, -2e-4]
+    for turns, other in ((1, 1), (2, 2), (2, -2)):
+        values = np.array([-4.5 + 1j * turns, -4.5 + 1j * other, *slow, -3 + 0.7j, -3 - 0.7j])
+        assert sorted(values[one_of_each(values, 2.0)].real) == [-4.5, -3, 2e-4]
+    apart = np.array([1e-3 + 1j, -1e-3 + 3j, *slow])  # a real multiplier and its inverse, in two numberings
+    assert sorted(apart[one_of_each(apart, 2.0)].real) == [2e-4, 1e-3]
 
 
 @pytest.mark.slow
@@ -90,6 +117,18 @@ def test_where_hills_determinant_is_unstable_mathieus_equation_is():
     assert found.values.size == 2
     assert found.values.real.max() == pytest.approx(b, rel=1e-4)
     assert np.abs(found.values.imag) == pytest.approx([0.5, 0.5])
+
+
+def test_what_grows_and_stands_still_in_the_turning_axes_has_real_eigenvalues():
+    """Of a disc on a flat shaft, with a little that varies: by that `campbell` knows the range in which it is unstable."""
+    k, other = np.array([1e4, 1.21e4]), np.array([[3.0, 1.0], [1.0, 2.0]])
+    for speed in (102.0, 105.0, 108.0):
+        C = np.array([[[0, -2 * speed], [2 * speed, 0]], np.zeros((2, 2))], complex)
+        found = hill(Varying(np.array([np.diag(k - speed**2), (1 + 0.3j) * other]), C, speed))
+        (grown,) = np.flatnonzero(found.values.real > 1)
+        square = speed**2 + k.mean() - np.sqrt(4 * speed**2 * k.mean() + (np.diff(k)[0] / 2) ** 2)
+        assert found.values[grown].real == pytest.approx(np.sqrt(-square), rel=1e-3)
+        assert found.values[grown].imag == 0
 
 
 @pytest.mark.parametrize("slow", [0.3, 0.05, 0.02])
