@@ -1,7 +1,7 @@
 """Campbell diagrams: frequencies and damping of a turning scene over its speed, critical speeds, limits of stability.
 
 The steady motion at each speed begins where the last one ended; its vibrations are followed by their shapes
-(`ffr_dyn.linear.spectrum`). Where a frequency crosses a multiple of the speed, or a vibration begins to grow, is found by by
+(`ffr_dyn.linear.spectrum`). Where a frequency crosses a multiple of the speed, or a vibration begins to grow, is found by
 Brent's method on steady motions in between.
 """
 
