@@ -27,7 +27,6 @@ from ffr_prep.model.reference import ReferenceConditions, SimplySupported, funct
 from ffr_prep.reduction.basis import factorised
 from ffr_prep.reduction.methods.craig_bampton import CraigBampton
 from ffr_prep.solids.assembly import assemble, vector_mass
-from ffr_prep.solids.interfaces import couple
 from ffr_prep.solids.model import nodal_basis
 
 Array = np.ndarray
@@ -57,13 +56,10 @@ def meshed_body(
     regions = [InterfaceRegion(end, kind=kind) for end in ends]
     conditions = SimplySupported(*ends) if reference is None else reference
     method = CraigBampton(modes)
-    body = fp.reduce(
-        fp.from_mesh(mesh, material, regions),
-        fp.Request(name=name, reference=conditions, reduction=method, linear=linear),
-    )
+    meshed = fp.from_mesh(mesh, material, regions)
+    body = fp.reduce(meshed, fp.Request(name=name, reference=conditions, reduction=method, linear=linear))
     with threadpool_limits(1):  # as fp.reduce: bit for bit the same modes, also where frequencies are double
-        matrices = assemble(mesh, material)
-        model = couple(mesh, matrices, regions)
+        matrices, model = assemble(mesh, material), meshed.coupled
         Phi = nodal_basis(model, method.basis(model, factorised(model), functionals(conditions, model)))
     return MeshedBody(body, mesh.points, matrices.K, vector_mass(matrices.m), Phi)
 
