@@ -91,7 +91,7 @@ class Request:
 
     def __post_init__(self) -> None:
         if self.drawn_modes is not None and self.drawn_modes < 1:
-            raise InputError(f"drawn_modes is {self.drawn_modes}; give 1 or more, or linear=True")
+            raise InputError(f"drawn_modes is {self.drawn_modes}; give 1 or more, or linear=True in its place")
         if self.drawn_modes is not None and self.linear:
             raise InputError(
                 "drawn_modes says which modes foreshorten what is drawn, and linear that none does: give one"

@@ -138,7 +138,7 @@ CONDITIONS = [
     Case(p(cut, [PLANE, fp.CutPlane((0.52, 0, 0), (1, 0, 0))]), p(cut, [PLANE])),
     Case(p(cut, 2, InterfaceRegion("side", "front", "mean")), p(cut, 2, RIGHT)),
     Case(p(fp.Request, name="a", reference="mean", reduction=fp.Guyan()), p(held, fp.MeanAxis())),
-    Case(p(reduced, LEFT, drawn_modes=0), p(reduced, LEFT, drawn_modes=1)),
+    Case(p(reduced, LEFT, drawn_modes=0), p(reduced, LEFT, drawn_modes=1, linear=False)),
     Case(p(reduced, LEFT, drawn_modes=1, linear=True), p(reduced, LEFT, linear=True)),
     Case(
         p(reduced, "left", InterfaceRegion("right", point=(1e4, 0.0, 0.0))),
