@@ -313,7 +313,8 @@ def _sought(at: AtSpeed, one: Row, other: Row, m: int, measure: Measure) -> tupl
 
     def measured(speed: float) -> float:
         row = _row_at(at, known, speed)
-        known.extend([row] if speed not in [one[0] for one in known] else [])
+        if all(speed != one[0] for one in known):
+            known.append(row)
         return measure(*row, m)
 
     return float(brentq(measured, one[0], other[0], xtol=MET * abs(other[0] - one[0]))), known

@@ -6,6 +6,7 @@ What a steady motion is and how it is found, `ffr_dyn.linear.steady_state` says.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, ClassVar
@@ -32,6 +33,10 @@ from ffr_prep.common.errors import ComputationError, InputError
 from ffr_prep.common.progress import no_count
 
 CLOSEST = 256  # parts of the way between two speeds, at most, by which a motion is followed
+HELD_AT_REST = (
+    "at rest, forces such as the weight of what is not quite balanced turn what nothing drives: it is held there, as at "
+    "speeds, over whose turns they are a mean"
+)
 GROWS = 1e-7  # of a real part relative to the eigenvalue, or the speed: what is no rounding
 TURN = option("--turn", "What has the speed: a driver, or a joint coordinate such as hinge.angle.", metavar="NAME")
 SPEEDS = option("--speed", "Speed: 314 [rad/s], '3000 rpm', 0..500, '0..6000 rpm:13'; repeat.", metavar="SPEED")
@@ -196,18 +201,11 @@ def _first(scene: Scene, speed: float, turn: str, time: float, start: Array | No
     """At the first speed [rad/s]; at rest held where its weight would turn it a little, which is no more once it turns."""
     try:
         return _at(scene, speed, turn, time, start)
-    except InputError:
-        try:
+    except InputError as error:
+        with suppress(InputError, LeapError):
             assembled, found = _at(scene, speed, turn, time, start, held_at_rest)
-        except (InputError, LeapError):
-            found = None
-        if found is None:
-            raise
-    note = (
-        "at rest, forces such as the weight of what is not quite balanced turn what nothing drives: it is held there, as at "
-        "speeds, over whose turns they are a mean"
-    )
-    return assembled, replace(found, notes=(note, *found.notes))
+            return assembled, replace(found, notes=(HELD_AT_REST, *found.notes))
+        raise error
 
 
 def held_near(
