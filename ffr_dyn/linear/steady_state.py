@@ -586,7 +586,7 @@ def _require_balance(found: Steady, unbalanced: float) -> None:
     motion = named_motion(system.scene, system.layout, found.x, Z @ loose @ along)
     raise InputError(
         f"no steady motion: what acts along {motion} speeds it up or slows it down; add a driver of constant speed, or leave "
-        "out the force that does"
+        "out the force that does; at a critical speed, where nothing holds a shaft, begin beside it"
     )
 
 

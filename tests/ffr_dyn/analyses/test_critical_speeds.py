@@ -196,3 +196,14 @@ def test_where_a_whirl_takes_the_shape_of_another_is_no_critical_speed():
     roots = [np.sqrt(np.linalg.eigvalsh([[k + far, -far], [-far, far]])) for k in near]
     assert not any(((root > 200) & (root < 280)).any() for root in roots)
     assert found.attributes["critical"] == []
+
+
+def test_a_diagram_that_begins_at_a_critical_speed_says_to_begin_beside_it():
+    scene = jeffcott((1e4, 1e4))
+    hub, disc = scene.bodies
+    model = fd.rigid_body(
+        "disc", mass=1.0, inertia=(1e-3, 1e-3, 2e-3), centre_of_mass=(1e-4, 0, 0), points={"c": (0, 0, 0)}
+    )
+    scene = replace(scene, bodies=(hub, replace(disc, model=model)))
+    with pytest.raises(fd.InputError, match="at a critical speed, where nothing holds a shaft, begin beside it"):
+        fd.campbell(scene, speeds=(100.0, 130.0), modes=2)
