@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from planar_beam import planar_beam
 from synthetic import cloud
 from test_analyses_kinematic import bar, slider_crank
 
@@ -188,20 +189,38 @@ def test_bad_input():
         inverse(replace(arm("revolute"), drivers=()), end=1.0, output_step=0.1)
 
 
-def test_quasi_static_deformation_needs_joints_that_rigid_bodies_can_meet():
-    """A body on two bearings of one axle: met by deformation only."""
-    body = replace(flexible_arm().bodies[1], position=(0, 0, 0))
+def test_two_bearings_of_one_axle_are_met_by_quasi_static_deformation():
+    """The body bulges as it turns, and its bearings hold it: nearly as it begins a slow run."""
+    body = Body("b", cloud(9, stiffness=400.0), damping=0.7)
     points = {key: body.model.interface(key).position for key in "ab"}
-    scene = Scene(
-        (body,),
-        (Joint("A", "revolute", "ground.a", "b.a"), Joint("C", "revolute", "ground.b", "b.b")),
-        ground=points,
-    )
     line = points["b"] - points["a"]
-    joints = tuple(replace(joint, axis=line, axis_j=line) for joint in scene.joints)
-    scene = replace(scene, joints=joints, drivers=(Driver("d", "A", polynomial(0.0, 1.0)),))
-    with pytest.raises(InputError, match="met by deformation only"):
-        inverse(scene, end=0.1, output_step=0.05, elastic=QuasiStatic())
+    hinges = [Joint(name, "revolute", f"ground.{p}", f"b.{p}", axis=line, axis_j=line) for name, p in ("Aa", "Cb")]
+    scene = Scene((body,), tuple(hinges), (Driver("d", "A", polynomial(0.3, 1.0)),), ground=points, gravity=G)
+    still = inverse(scene, end=0.1, output_step=0.05, elastic=QuasiStatic())
+    begun = inverse(scene, end=1e-4, output_step=1e-4, elastic=Dynamic(RK4(1e-5), begin="quasi-static"))
+    for name in ("b.q", "A.force", "C.force", "A.moment", "d.effort"):
+        np.testing.assert_allclose(begun[name][0], still[name][0], atol=0.02 * np.abs(still[name]).max())
+    assert np.abs(still["C.force"]).min() > 1
+
+
+@pytest.mark.parametrize("plane", ["auto", "none"])
+def test_a_propped_cantilever_that_is_turned_ever_faster(plane):
+    """Load mu alpha x, clamped at x = 0: the prop carries 11/40 of mu alpha L^2 (Roark, Formulas for Stress and Strain)."""
+    length, mass, alpha = 0.8, 1.5, 30.0
+    beam = planar_beam("beam", length, mass, bending=400.0, modes=4)
+    hub = rigid_body("hub", mass=1.0, inertia=np.full(3, 0.01), points={"root": (0, 0, 0), "tip": (length, 0, 0)})
+    joints = (
+        Joint("turn", "revolute", "ground.O", "hub.root"),
+        Joint("clamp", "fixed", "hub.root", "beam.root", axis=(0, 0, 1), axis_j=(0, 0, 1)),
+        Joint("prop", "point-on-plane", "hub.tip", "beam.tip", axis=(0, 1, 0)),
+    )
+    scene = Scene(
+        (Body("hub", hub), Body("beam", beam)), joints, (Driver("motor", "turn", polynomial(0.0, 0.0, alpha / 2)),),
+        ground={"O": (0, 0, 0)}, plane=plane,
+    )  # fmt: skip
+    found = inverse(scene, end=0.02, output_step=0.02, elastic=QuasiStatic())
+    np.testing.assert_allclose(found["motor.effort"][0], (mass * length**2 / 3 + 0.01) * alpha, rtol=1e-5)
+    np.testing.assert_allclose(found["prop.force"][0], (0, 11 / 40 * mass * alpha * length, 0), atol=4e-3)  # four modes
 
 
 @pytest.mark.slow
