@@ -12,49 +12,71 @@ from ffr_prep.mesh.mesh import Block, Mesh
 from ffr_prep.model.material import Material
 
 STEEL = Material(name="steel", E=2.1e11, nu=0.3, rho=7850.0)
-KINDS = ("tet4", "tet10", "hex8", "hex20", "hex27")
+PLAIN = ("tet4", "tet10", "hex8", "hex20", "hex27")  # those that scikit-fem has
+KINDS = (*PLAIN, "wedge6", "wedge15", "wedge18", "pyramid5", "pyramid13")
 SIDES = {"left": (0, 0), "right": (0, 1), "front": (1, 0), "back": (1, 1), "bottom": (2, 0), "top": (2, 1)}
 
-# Corners, edges, faces and centre of a cell of the doubled lattice, in VTK's order.
-_HEX = np.vstack(
-    [
-        [(0, 0, 0), (2, 0, 0), (2, 2, 0), (0, 2, 0), (0, 0, 2), (2, 0, 2), (2, 2, 2), (0, 2, 2)],
-        [(1, 0, 0), (2, 1, 0), (1, 2, 0), (0, 1, 0), (1, 0, 2), (2, 1, 2), (1, 2, 2), (0, 1, 2)],
-        [(0, 0, 1), (2, 0, 1), (2, 2, 1), (0, 2, 1)],
-        [(0, 1, 1), (2, 1, 1), (1, 0, 1), (1, 2, 1), (1, 1, 0), (1, 1, 2), (1, 1, 1)],
-    ]
-)
+# Corners of a cell of the lattice, 4 long so that all further nodes are on it; edges and faces in VTK's order.
+_CUBE = 4 * np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)])
 _TET_EDGES = ((0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3))
-_TET_FACES = ((0, 1, 2, 4, 5, 6), (0, 1, 3, 4, 8, 7), (1, 2, 3, 5, 9, 8), (2, 0, 3, 6, 7, 9))
-_HEX_FACES = (
-    (0, 3, 7, 4, 11, 19, 15, 16, 20),
-    (1, 2, 6, 5, 9, 18, 13, 17, 21),
-    (0, 1, 5, 4, 8, 17, 12, 16, 22),
-    (3, 2, 6, 7, 10, 18, 14, 19, 23),
-    (0, 1, 2, 3, 8, 9, 10, 11, 24),
-    (4, 5, 6, 7, 12, 13, 14, 15, 25),
-)
 _HEX_EDGES = ((0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7))
-_MEANS = {
-    "tet4": (),
-    "tet10": _TET_EDGES,
-    "hex8": (),
-    "hex20": _HEX_EDGES,
-    "hex27": (*_HEX_EDGES, *(face[:4] for face in _HEX_FACES), tuple(range(8))),
+_WEDGE_EDGES = ((0, 1), (1, 2), (2, 0), (3, 4), (4, 5), (5, 3), (0, 3), (1, 4), (2, 5))
+_PYRAMID_EDGES = ((0, 1), (1, 2), (2, 3), (3, 0), (0, 4), (1, 4), (2, 4), (3, 4))
+_HEX_FACES = ((0, 3, 7, 4), (1, 2, 6, 5), (0, 1, 5, 4), (3, 2, 6, 7), (0, 1, 2, 3), (4, 5, 6, 7))
+_FACES = {
+    "tet": ((0, 1, 2), (0, 1, 3), (1, 2, 3), (2, 0, 3)),
+    "hex": _HEX_FACES,
+    "wedge": ((0, 1, 2), (3, 4, 5), (0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5)),
+    "pyramid": ((0, 1, 2, 3), (0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4)),
 }
-_NODES = {"tet4": 4, "tet10": 10, "hex8": 8, "hex20": 20, "hex27": 27}
-_FACE_NODES = {"tet4": 3, "tet10": 6, "hex8": 4, "hex20": 8, "hex27": 9}
+_MEANS = {
+    "tet10": _TET_EDGES,
+    "hex20": _HEX_EDGES,
+    "hex27": (*_HEX_EDGES, *_HEX_FACES, tuple(range(8))),
+    "wedge15": _WEDGE_EDGES,
+    "wedge18": (*_WEDGE_EDGES, *_FACES["wedge"][2:]),
+    "pyramid13": _PYRAMID_EDGES,
+}
 
 
 def _kuhn_tetrahedra() -> np.ndarray:
-    """(6, 10, 3) the six tetrahedra of a cell of the doubled lattice, mid-edge nodes last."""
+    """(6, 4, 3) the six tetrahedra of a cell."""
     tetrahedra = []
     for axes in permutations(range(3)):
-        corners = np.cumsum(np.vstack([np.zeros(3, int)] + [2 * np.eye(3, dtype=int)[a] for a in axes]), axis=0)
-        if np.linalg.det(np.eye(3)[list(axes)]) < 0:
-            corners = corners[[1, 0, 2, 3]]
-        tetrahedra.append(np.vstack([corners, [(corners[a] + corners[b]) // 2 for a, b in _TET_EDGES]]))
+        corners = np.cumsum(np.vstack([np.zeros(3, int)] + [4 * np.eye(3, dtype=int)[a] for a in axes]), axis=0)
+        tetrahedra.append(corners if np.linalg.det(np.eye(3)[list(axes)]) > 0 else corners[[1, 0, 2, 3]])
     return np.array(tetrahedra)
+
+
+def _pyramids() -> np.ndarray:
+    """(6, 5, 3) pyramids over the faces of a cell, with their apex in its middle."""
+    inward = [face[::-1] if np.linalg.det(_CUBE[list(face[:3])] - 2) > 0 else face for face in _HEX_FACES]
+    return np.array([[*_CUBE[list(face)], (2, 2, 2)] for face in inward])
+
+
+_CELLS = {
+    "tet": _kuhn_tetrahedra(),
+    "hex": _CUBE[None],
+    "wedge": np.array([_CUBE[[0, 1, 2, 4, 5, 6]], _CUBE[[0, 2, 3, 4, 6, 7]]]),
+    "pyramid": _pyramids(),
+}
+
+
+def _shape(kind: str) -> str:
+    return kind.rstrip("0123456789")
+
+
+def _whole(kind: str, corners: tuple[int, ...]) -> list[int]:
+    """The corners of a face, then the nodes on its edges in turn, then that in its middle."""
+    first = _CELLS[_shape(kind)].shape[1]
+    further = {frozenset(of): first + k for k, of in enumerate(_MEANS.get(kind, ()))}
+    around = [frozenset(edge) for edge in zip(corners, (*corners[1:], corners[0]), strict=True)]
+    return [*corners, *(further[of] for of in (*around, frozenset(corners)) if of in further)]
+
+
+def on_side(points: np.ndarray, axis: int, place: float) -> np.ndarray:
+    """(F,) whether all points of faces (F, k, 3) have this coordinate."""
+    return (points[..., axis] == place).all(axis=1)
 
 
 def box_mesh(
@@ -65,16 +87,20 @@ def box_mesh(
     mapped: Callable[[np.ndarray], np.ndarray] | None = None,
 ) -> Mesh:
     """The box origin + [0, size] of one element kind, its six sides as face groups; `mapped` moves the points."""
-    local = _HEX[None] if kind.startswith("hex") else _kuhn_tetrahedra()
-    faces = _HEX_FACES if kind.startswith("hex") else _TET_FACES
-    cell_origins = 2 * np.array(list(product(*(range(n) for n in cells))))
-    lattice = (cell_origins[:, None, None] + local[None]).reshape(-1, local.shape[1], 3)[:, : _NODES[kind]]
-    nodes, connectivity = np.unique(lattice.reshape(-1, 3), axis=0, return_inverse=True)
-    connectivity = connectivity.reshape(-1, _NODES[kind])
-    points = np.array(origin) + nodes * np.array(size) / (2 * np.array(cells))
-    every_face = np.vstack([connectivity[:, face[: _FACE_NODES[kind]]] for face in faces])
+    corners = _CELLS[_shape(kind)]
+    local = np.concatenate(
+        [corners, *(corners[:, list(of)].mean(axis=1, keepdims=True) for of in _MEANS.get(kind, ()))], axis=1
+    )
+    cell_origins = 4 * np.array(list(product(*(range(n) for n in cells))))
+    lattice = (cell_origins[:, None, None] + local[None]).reshape(-1, 3)
+    nodes, connectivity = np.unique(lattice, axis=0, return_inverse=True)
+    connectivity = connectivity.reshape(-1, local.shape[1])
+    points = np.array(origin) + nodes * np.array(size) / (4 * np.array(cells))
+    faces = [connectivity[:, _whole(kind, face)] for face in _FACES[_shape(kind)]]
+    sizes = dict.fromkeys(of.shape[1] for of in faces)
+    every_face = [np.vstack([of for of in faces if of.shape[1] == k]) for k in sizes]
     groups = {
-        side: (every_face[(nodes[every_face][..., axis] == end * 2 * cells[axis]).all(axis=1)],)
+        side: tuple(of[there] for of in every_face if (there := on_side(nodes[of], axis, 4 * end * cells[axis])).any())
         for side, (axis, end) in SIDES.items()
     }
     return Mesh(
@@ -97,8 +123,8 @@ def straightened(mesh: Mesh) -> Mesh:
     """The mesh with every further node at the mean of the corners of its edge, face or cell."""
     points = mesh.points.copy()
     for block in mesh.blocks:
-        corners = block.nodes[:, : 4 if block.kind.startswith("tet") else 8]
-        for k, of in enumerate(_MEANS[block.kind]):
+        corners = block.nodes[:, : _CELLS[_shape(block.kind)].shape[1]]
+        for k, of in enumerate(_MEANS.get(block.kind, ())):
             points[block.nodes[:, corners.shape[1] + k]] = points[corners[:, list(of)]].mean(axis=1)
     return replace(mesh, points=points)
 

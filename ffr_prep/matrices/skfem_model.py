@@ -23,7 +23,7 @@ from ffr_prep.mesh.mesh import Block, Mesh, surface_triangles
 from ffr_prep.mesh.shapes import jacobian_determinants, local_order
 
 _NODAL = 1e-12
-_LINEAR = {skfem.ElementTetP1.refdom: "tet4", skfem.ElementHex1.refdom: "hex8"}
+_LINEAR = {skfem.ElementTetP1.refdom: "tet4", skfem.ElementHex1.refdom: "hex8", skfem.ElementWedge1.refdom: "wedge6"}
 
 
 def from_skfem(

@@ -27,17 +27,22 @@ from ffr_prep.mesh.left_out import left_out_of_abaqus
 
 Row = list[str]
 
-# Corners of the faces S1, S2, ... of tetrahedra and hexahedra. The node order of the elements is that of VTK but for the last
+# Corners of the faces S1, S2, ... of elements by their number of nodes. The node order is that of VTK but for the last
 # seven nodes of C3D27: the centre, then those of the faces S1 to S6.
 _TET_FACES = ((0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0))
 _HEX_FACES = ((0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0))
+_WEDGE_FACES = ((0, 1, 2), (3, 5, 4), (0, 3, 4, 1), (1, 4, 5, 2), (2, 5, 3, 0))
+_PYRAMID_FACES = ((0, 1, 2, 3), (0, 4, 1), (1, 4, 2), (2, 4, 3), (3, 4, 0))
+_FACES = dict.fromkeys((4, 10), _TET_FACES) | dict.fromkeys((8, 20, 27), _HEX_FACES)
+_FACES |= dict.fromkeys((6, 15), _WEDGE_FACES) | dict.fromkeys((5, 13), _PYRAMID_FACES)
 _HEX27 = [*range(20), 26, 24, 23, 25, 21, 22, 20]
-_SOLID = re.compile(r"(?:C3D|DC3D)(\d+)")
+_SOLID = re.compile(r"(?:C3D|DC3D)(\d+)(V?)")  # V: as many nodes in the faces as there are
 _PLANE = re.compile(r"(?:S|SC|STRI|CPS|CPE|CPEG|CAX|M3D|SFM3D|R3D|DS|DC2D)(3|4|6|8|9|65)(?!\d)")
 _CORNERS = {3: 3, 6: 3, 65: 3, 4: 4, 8: 4, 9: 4}
 _MAKING = ("NGEN", "NFILL", "NCOPY", "NMAP", "ELGEN", "ELCOPY", "SYSTEM")
 _LISTED = "write the mesh with every node in global axes and every element listed, as programs with a window do"
 _KINDS = {4: "tet4", 10: "tet10", 8: "hex8", 20: "hex20", 27: "hex27"}
+_KINDS |= {6: "wedge6", 15: "wedge15", 5: "pyramid5", 13: "pyramid13"}
 
 
 @dataclass
@@ -160,7 +165,8 @@ def _read_elements(deck: _Deck, parameters: Mapping[str, str], rows: list[Row]) 
     solid, plane = _SOLID.match(kind), _PLANE.match(kind)
     size = int((solid or plane or [0, 0])[1])
     if solid:
-        target = deck.solids.setdefault(supported_kind(_KINDS.get(size, kind), parameters["TYPE"]), {})
+        ours = kind if solid[2] else _KINDS.get(size, kind)
+        target = deck.solids.setdefault(supported_kind(ours, parameters["TYPE"]), {})
     elif plane:
         target, size = deck.faces, 6 if size == 65 else size
     else:
@@ -363,5 +369,4 @@ def _sides(deck: _Deck, rows: list[tuple[str, str]]) -> list[list[int]]:
 
 
 def _side(nodes: list[int], side: int) -> list[int]:
-    table = _TET_FACES if len(nodes) in (4, 10) else _HEX_FACES
-    return [nodes[k] for k in table[side]]
+    return [nodes[k] for k in _FACES[len(nodes)][side]]

@@ -67,9 +67,19 @@ def _turns(corners: Array) -> Array:
 
 
 def _owners(blocks: Blocks) -> Array:
-    """(F,) the element of every side."""
-    per_element = np.concatenate([np.full(len(nodes), len(KINDS[kind].faces)) for kind, nodes in blocks])
-    return np.repeat(np.arange(per_element.size), per_element)
+    """(F,) the element of every side, in the order of `_sides`."""
+    first = np.cumsum([0, *(len(nodes) for _, nodes in blocks)])
+    parts = [
+        np.repeat(np.arange(*first[k : k + 2]), len(of))
+        for k, (kind, _) in enumerate(blocks)
+        for of in KINDS[kind].faces
+    ]
+    return np.concatenate(parts)
+
+
+def _sides(blocks: Blocks) -> tuple[Array, ...]:
+    """The sides of all elements, an array (F, k) for each block and size of face."""
+    return tuple(nodes[:, of].reshape(-1, of.shape[1]) for kind, nodes in blocks for of in KINDS[kind].faces)
 
 
 def misfits(blocks: Blocks) -> tuple[Array, Array]:
@@ -87,8 +97,9 @@ def misfits(blocks: Blocks) -> tuple[Array, Array]:
 
 def _edges(kind: str, nodes: Array) -> tuple[Array, Array]:
     """(m, 2) the edges of elements by their ends, and (m,) whether they have a node in the middle."""
-    corners = KINDS[kind].faces[:, : face_corners(KINDS[kind].faces.shape[1])]
-    ends = np.unique(np.sort(np.stack([corners, np.roll(corners, 1, axis=1)], axis=-1).reshape(-1, 2), axis=1), axis=0)
+    corners = [of[:, : face_corners(of.shape[1])] for of in KINDS[kind].faces]
+    around = [np.stack([of, np.roll(of, 1, axis=1)], axis=-1).reshape(-1, 2) for of in corners]
+    ends = np.unique(np.sort(np.concatenate(around), axis=1), axis=0)
     found = nodes[:, ends].reshape(-1, 2)
     return found, np.full(len(found), KINDS[kind].size > KINDS[kind].corners)
 
@@ -118,8 +129,8 @@ def _parts(elements: Array, shared: Array) -> Array:
 
 
 def _numbered(blocks: Blocks, corners: Sequence[Array]) -> tuple[tuple[Array, ...], Array, Array]:
-    """The sides by block, the face number of the given corners, and the face number of every side."""
-    faces = tuple(nodes[:, KINDS[kind].faces].reshape(-1, KINDS[kind].faces.shape[1]) for kind, nodes in blocks)
+    """The sides (`_sides`), the face number of the given corners, and the face number of every side."""
+    faces = _sides(blocks)
     of_sides = [_keys(side[:, : face_corners(side.shape[1])]) for side in faces]
     keys = np.concatenate([*of_sides, *map(_keys, corners)])
     base = keys.max(initial=0) + 2

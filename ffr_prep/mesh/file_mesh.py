@@ -93,6 +93,6 @@ def supported_kind(kind: str, name: str) -> str:
     if kind not in KINDS:
         raise InputError(
             f"the mesh has volume elements of kind {name!r}; only {', '.join(KINDS)} can be used: mesh again with "
-            "tetrahedra or hexahedra of first or second order"
+            "tetrahedra, hexahedra, wedges or pyramids of first or second order"
         )
     return kind

@@ -3,7 +3,7 @@
 Nodes stand in the block 2C, elements in 3C; of the results behind them nothing is read. Elements are grouped by their
 material number, material_N.
 
-Source: K. Wittig, CalculiX GraphiX user's manual, section "Result Format" (element types, order of the nodes of he20).
+Source: K. Wittig, CalculiX GraphiX user's manual, section "Result Format" (element types, order of the nodes).
 """
 
 from __future__ import annotations
@@ -16,20 +16,16 @@ import numpy as np
 
 from ffr_prep.common.errors import InputError
 from ffr_prep.common.reading import read_text
-from ffr_prep.mesh.file_mesh import FileMesh, supported_kind
+from ffr_prep.mesh.file_mesh import FileMesh
 
-_KINDS = {1: "hex8", 3: "tet4", 4: "hex20", 6: "tet10"}
-_OTHERS = {2: "pe6", 5: "pe15"}
+_KINDS = {1: "hex8", 2: "wedge6", 3: "tet4", 4: "hex20", 5: "wedge15", 6: "tet10"}
 _SIZES = {1: 8, 2: 6, 3: 4, 4: 20, 5: 15, 6: 10, 7: 3, 8: 6, 9: 4, 10: 8, 11: 2, 12: 3}
-_HEX20 = [
-    *range(12),
-    *range(16, 20),
-    *range(12, 16),
-]  # the edges between both faces stand before those of the second one
+# The edges between both ends stand before those of the second one.
+_ORDER = {"hex20": [*range(12), *range(16, 20), *range(12, 16)], "wedge15": [*range(9), *range(12, 15), *range(9, 12)]}
 
 
 def from_frd(path: Path) -> FileMesh:
-    """The mesh of a .frd file. Raises InputError for a binary or damaged one, and for wedges."""
+    """The mesh of a .frd file. Raises InputError for a binary or damaged one."""
     lines = read_text(path, "a result file of CalculiX").splitlines()
     nodes: dict[int, list[float]] = {}
     elements: dict[int, list[tuple[int, list[int]]]] = defaultdict(list)
@@ -46,8 +42,6 @@ def from_frd(path: Path) -> FileMesh:
         raise InputError(
             f"{path} is no result file of CalculiX, or damaged: a line of nodes or elements has no numbers"
         ) from None
-    for kind in set(elements) & set(_OTHERS):
-        supported_kind("", _OTHERS[kind])
     ignored = {kind: len(of) for kind, of in elements.items() if kind not in _KINDS}
     solids = {kind: of for kind, of in elements.items() if kind in _KINDS}
     index = {number: k for k, number in enumerate(nodes)}
@@ -58,7 +52,7 @@ def from_frd(path: Path) -> FileMesh:
     materials = np.array([material for of in solids.values() for material, _ in of], np.int64)
     return FileMesh(
         points=np.array(list(nodes.values()), float).reshape(-1, 3),
-        blocks=tuple((_KINDS[kind], of[:, _HEX20] if kind == 4 else of) for kind, of in blocks.items()),
+        blocks=tuple((_KINDS[kind], of[:, _ORDER.get(_KINDS[kind], slice(None))]) for kind, of in blocks.items()),
         volumes={f"material_{n}": np.flatnonzero(materials == n) for n in np.unique(materials).tolist()},
         faces={},
         nodes={},

@@ -26,7 +26,7 @@ from ffr_prep.common.errors import ComputationError, InputError
 from ffr_prep.common.reading import read_text
 from ffr_prep.common.registry import choice
 from ffr_prep.mesh import gmsh_process
-from ffr_prep.mesh.cells import node_order
+from ffr_prep.mesh.cells import KINDS, node_order
 from ffr_prep.mesh.file_mesh import DrawnFace, FileMesh, FileSkin, FileSolid, supported_kind
 from ffr_prep.mesh.formats import MOST_ELEMENTS
 from ffr_prep.mesh.geometry.face import METRES
@@ -51,6 +51,13 @@ _SIGNATURES = {  # how files of data begin
     ".brep": rb"\s*(DBRep_DrawableShape|CASCADE Topology)",
 }
 _WITH_UNIT = (".step", ".stp", *_IGES)
+_SHAPES = {"etrahedron": "tet", "exahedron": "hex", "rism": "wedge", "yramid": "pyramid"}
+_SYMMETRIC = {  # by corners, the coordinates of gmsh's reference element that go from -1 to 1
+    4: (False, False, False),
+    5: (True, True, False),
+    6: (False, False, True),
+    8: (True, True, True),
+}
 _LIBRARIES = "libglu1-mesa libgl1 libxcursor1 libxft2 libxinerama1 libgomp1"
 
 
@@ -324,13 +331,13 @@ def _nodes(stored: Mapping[str, Array], names: Mapping[str, list[str]]) -> dict[
 
 
 def _gmsh_kind(name: str, size: int) -> str:
-    kind = f"{'tet' if 'etrahedron' in name else 'hex' if 'exahedron' in name else name}{size}"
-    return supported_kind(kind, name)
+    shape = next((ours for word, ours in _SHAPES.items() if word in name), name)
+    return supported_kind(f"{shape}{size}", name)
 
 
 def _gmsh_block(kind: str, stored: dict[str, Array], k: int) -> tuple[str, Array]:
     local = stored[f"local_{k}"]
-    unit = local if kind.startswith("tet") else (local + 1) / 2
+    unit = np.where(_SYMMETRIC[KINDS[kind].corners], (local + 1) / 2, local)
     return kind, stored[f"cells_{k}"][:, node_order(kind, unit)]
 
 

@@ -39,7 +39,7 @@ _CELLS = {  # meshio's name and the number of nodes
     "Hexaedra": ("hexahedron", 8),  # as the report that describes the format spells it
     "HexahedraQ2": ("hexahedron27", 27),
 }
-_CURVED = {"tetra10": "tet10", "hexahedron27": "hex27"}
+_CURVED = {"tetra10": "tet10", "hexahedron27": "hex27", "wedge18": "wedge18"}
 _KEYWORD = re.compile(r"^[ \t]*([A-Za-z]\w*)", re.MULTILINE)
 _FIRST = "MeshVersionFormatted"
 _WHAT = "a mesh of Medit"

@@ -431,8 +431,8 @@ def _check_collapsed(mesh: Mesh) -> None:
     if found:
         raise InputError(
             f"{len(found)} elements name a node twice, the first being element {found[0]} at "
-            f"{_at(_centres(mesh)[found[0]])}: wedges and pyramids written as collapsed hexahedra cannot be used; mesh with "
-            "tetrahedra, or with hexahedra alone"
+            f"{_at(_centres(mesh)[found[0]])}: wedges and pyramids written as collapsed hexahedra cannot be used; write "
+            "them as elements of their own (C3D6, CPENTA, CPYRAM), or mesh with tetrahedra or with hexahedra alone"
         )
 
 

@@ -13,10 +13,12 @@ import numpy as np
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 from ffr_prep.common.reading import not_of_its_ending
+from ffr_prep.mesh.cells import WEDGE_TURNED
 from ffr_prep.mesh.file_mesh import FileMesh, supported_kind
 from ffr_prep.mesh.medit import from_medit
 
 _VOLUMES = {"tetra": "tet4", "tetra10": "tet10", "hexahedron": "hex8", "hexahedron20": "hex20", "hexahedron27": "hex27"}
+_VOLUMES |= {"wedge": "wedge6", "wedge18": "wedge18", "pyramid": "pyramid5"}
 _FACES = {"triangle": 3, "triangle6": 3, "triangle7": 3, "quad": 4, "quad8": 4, "quad9": 4}
 _MOST_TAGS = 100
 _NO_NODE_TAGS = ("gmsh:dim_tags",)
@@ -33,7 +35,7 @@ def from_meshio(path: Path) -> FileMesh:
     groups = dict(_cell_sets(read)) | dict(_tagged_cells(read))
     return FileMesh(
         points=_in_space(path, read.points),
-        blocks=tuple((_kind(read.cells[k].type), np.asarray(read.cells[k].data, np.int64)) for k in volumes),
+        blocks=tuple(_block(read, k) for k in volumes),
         volumes=_volume_groups(read, volumes, groups),
         faces=_face_groups(read, faces, groups),
         nodes=_node_groups(read),
@@ -65,8 +67,15 @@ def _in_space(path: Path, points: Array) -> Array:
     return np.asarray(points, np.float64)
 
 
-def _kind(cell_type: str) -> str:
-    return supported_kind(_VOLUMES.get(cell_type, cell_type), cell_type)
+def _block(read: meshio.Mesh, k: int) -> tuple[str, Array]:
+    """Kind and nodes of the elements; of wedges the lower triangle first, for which the lists of VTK have either."""
+    cells = read.cells[k]
+    kind, nodes = supported_kind(_VOLUMES.get(cells.type, cells.type), cells.type), np.asarray(cells.data, np.int64)
+    if kind not in WEDGE_TURNED or not len(nodes):
+        return kind, nodes
+    first, second, third, above = (np.asarray(read.points, float)[nodes[:, c]] for c in range(4))
+    up = np.sum(np.cross(second - first, third - first) * (above - first), axis=1)
+    return kind, nodes if (up > 0).any() else nodes[:, WEDGE_TURNED[kind]]
 
 
 def _ignored(read: meshio.Mesh) -> Iterator[str]:

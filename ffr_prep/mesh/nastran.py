@@ -1,6 +1,6 @@
-"""Meshes in Nastran bulk data: GRID, CTETRA, CHEXA, faces of shells, property numbers, SET1, coordinate systems.
+"""Meshes in Nastran bulk data: GRID, solids, faces of shells, property numbers, SET1, coordinate systems.
 
-Source: MSC Nastran Quick Reference Guide (bulk data entries; order of the nodes of CTETRA and CHEXA).
+Source: MSC Nastran Quick Reference Guide (bulk data entries; order of the nodes of the solids).
 """
 
 from __future__ import annotations
@@ -17,14 +17,15 @@ from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 from ffr_prep.common.reading import check_count, read_text
 from ffr_prep.mesh.bulk_data import Card, cards
-from ffr_prep.mesh.file_mesh import FileMesh, supported_kind
+from ffr_prep.mesh.file_mesh import FileMesh
 from ffr_prep.mesh.left_out import left_out_of_nastran
 from ffr_prep.mesh.meshio_files import from_meshio
 
-# Nodes of elements and their corners; Nastran has the edges between both faces of a CHEXA before those of the second one.
+# Corners of elements and their nodes; Nastran has the edges between both ends of CHEXA and CPENTA before those of the second.
 _SOLIDS = {"CTETRA": (4, {4: "tet4", 10: "tet10"}), "CHEXA": (8, {8: "hex8", 20: "hex20"})}
-_HEX20 = [*range(12), *range(16, 20), *range(12, 16)]
-_OTHER_SOLIDS = ("CPENTA", "CPYRAM", "CPYRA")
+_SOLIDS |= {"CPENTA": (6, {6: "wedge6", 15: "wedge15"})}
+_SOLIDS |= dict.fromkeys(("CPYRAM", "CPYRA"), (5, {5: "pyramid5", 13: "pyramid13"}))
+_ORDER = {"hex20": [*range(12), *range(16, 20), *range(12, 16)], "wedge15": [*range(9), *range(12, 15), *range(9, 12)]}
 _FACES = {"CTRIA3": 3, "CTRIA6": 3, "CTRIAR": 3, "CQUAD4": 4, "CQUAD8": 4, "CQUADR": 4, "CQUAD": 4}
 _FLUIDS = ("PFLUID", "FFLUID")
 _SYSTEMS = ("CORD2R", "CORD2C", "CORD2S")
@@ -84,8 +85,6 @@ def _take(deck: _Deck, card: Card) -> None:
             raise InputError(f"{card} is defined twice")
     elif card.name in _SOLIDS:
         _take_solid(deck, card)
-    elif card.name in _OTHER_SOLIDS:
-        supported_kind(card.name, card.name)
     elif card.name in _FACES:
         deck.faces.append((card.integer(2, 0), [card.integer(3 + k) for k in range(_FACES[card.name])]))
     elif card.name in _SYSTEMS:
@@ -137,7 +136,7 @@ def _file_mesh(deck: _Deck) -> FileMesh:
     blocks = []
     for kind, elements in deck.solids.items():
         nodes = _indices(index, [of for _, of in elements])
-        blocks.append((kind, nodes[:, _HEX20] if kind == "hex20" else nodes))
+        blocks.append((kind, nodes[:, _ORDER[kind]] if kind in _ORDER else nodes))
     properties = np.array([number for elements in deck.solids.values() for number, _ in elements], np.int64)
     groups = {number: [of for own, of in deck.faces if own == number] for number in {own for own, _ in deck.faces}}
     sets = {f"set_{n}": np.unique([index[k] for k in of if k in index]) for n, of in deck.sets.items()}

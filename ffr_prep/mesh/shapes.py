@@ -12,9 +12,11 @@ from functools import cache
 
 import numpy as np
 import skfem
+from scipy.special import roots_jacobi
 from skfem.quadrature import get_quadrature
 
 from ffr_prep.common.arrays import Array
+from ffr_prep.mesh import own_elements
 from ffr_prep.mesh.cells import KINDS, node_order
 
 # Faces by their number of nodes: shape functions, whose order of nodes is VTK's, and order of the mass rule.
@@ -67,8 +69,29 @@ class _Mapping(skfem.MappingIsoparametric):  # type: ignore[misc]  # scikit-fem 
 
 @cache
 def shape_functions(kind: str) -> skfem.Element:
-    """scikit-fem's element of that kind."""
-    return getattr(skfem, KINDS[kind].shapes)()
+    """scikit-fem's element of that kind, or one like it."""
+    name = KINDS[kind].shapes
+    return getattr(skfem if hasattr(skfem, name) else own_elements, name)()
+
+
+@cache
+def quadrature(kind: str, order: int) -> tuple[Array, Array]:
+    """Points (3, Q) and weights (Q,) that integrate polynomials of that order over the reference element.
+
+    Of wedges the rule of the triangle times that of Gauss; scikit-fem's has three times as many points. Of pyramids a conical
+    product of rules of Gauss and Jacobi: the square shrinks by 1 - z. (A. H. Stroud, Approximate Calculation of Multiple
+    Integrals, 1971, sections 2.4 and 2.5.)
+    """
+    X, W = get_quadrature(skfem.ElementLineP1().refdom, order)
+    if KINDS[kind].corners == 6:
+        plane, of_plane = get_quadrature(skfem.ElementTriP1().refdom, order)
+        return np.vstack([np.repeat(plane, W.size, axis=1), np.tile(X, of_plane.size)]), np.outer(of_plane, W).ravel()
+    if KINDS[kind].corners == 5:
+        z, of_z = roots_jacobi(order // 2 + 1, 2, 0)
+        x, y, z = (of.ravel() for of in np.meshgrid(X[0], X[0], (1 + z) / 2, indexing="ij"))
+        weights = np.einsum("i,j,k->ijk", W, W, of_z / 8).ravel()
+        return np.stack([0.5 + (x - 0.5) * (1 - z), 0.5 + (y - 0.5) * (1 - z), z]), weights
+    return get_quadrature(shape_functions(kind).refdom, order)
 
 
 @cache
@@ -97,7 +120,7 @@ def scalar_basis(geometry: skfem.MappingIsoparametric, quadrature: tuple[Array, 
 
 def jacobian_determinants(kind: str, points: Array) -> Array:
     """(E, Q) volume ratio [m^3] of elements with nodes at `points` (E, k, 3), at the nodes and inside."""
-    inside, _ = get_quadrature(shape_functions(kind).refdom, 5)
+    inside, _ = quadrature(kind, 5)
     nodes = np.arange(points.shape[0] * points.shape[1]).reshape(points.shape[:2])
     return determinants(mapping(kind, points.reshape(-1, 3), nodes), np.hstack([KINDS[kind].nodes.T, inside]))
 

@@ -30,7 +30,8 @@ def element_edges(mesh: Mesh) -> Array:
 
 def _edges(kind: str) -> Array:
     """(e, 2) the edges of an element, by the positions of their corners among its nodes."""
-    around = [[node for node in face if node < KINDS[kind].corners] for face in KINDS[kind].faces.tolist()]
+    faces = [face for of in KINDS[kind].faces for face in of.tolist()]
+    around = [[node for node in face if node < KINDS[kind].corners] for face in faces]
     return np.unique([sorted(edge) for face in around for edge in zip(face, (*face[1:], face[0]), strict=True)], axis=0)
 
 

@@ -17,13 +17,12 @@ import numba
 import numpy as np
 import scipy.sparse as sp
 import skfem
-from skfem.quadrature import get_quadrature
 
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.compile_cache import check_compiled_code
 from ffr_prep.common.errors import InputError
 from ffr_prep.mesh.mesh import Mesh
-from ffr_prep.mesh.shapes import determinants, local_order, mapping, scalar_basis
+from ffr_prep.mesh.shapes import determinants, local_order, mapping, quadrature, scalar_basis
 from ffr_prep.model.material import AnisotropicMaterial, Material, Solid
 from ffr_prep.solvers.threads import ahead, finish, pieces, threads
 
@@ -36,7 +35,9 @@ _CHUNK = 4096
 # Orders of the quadrature rules. The stiffness is integrated in full (exactly on straight tetrahedra); the mass exactly
 # for every shape the element can take: its integrand is N_a N_b det J.
 STIFFNESS_ORDER = {"tet4": 1, "tet10": 2, "hex8": 3, "hex20": 5, "hex27": 5}
+STIFFNESS_ORDER |= {"wedge6": 3, "wedge15": 5, "wedge18": 5, "pyramid5": 3, "pyramid13": 5}
 MASS_ORDER = {"tet4": 2, "tet10": 7, "hex8": 5, "hex20": 9, "hex27": 9}
+MASS_ORDER |= {"wedge6": 5, "wedge15": 9, "wedge18": 9, "pyramid5": 5, "pyramid13": 9}
 
 
 @dataclass(frozen=True)
@@ -190,7 +191,7 @@ def chunks(mesh: Mesh, material: Materials) -> Iterator[Chunk]:
 def _basis(points: Array, chunk: Chunk, order: Mapping[str, int]) -> skfem.CellBasis:
     """The scalar basis of the elements at the quadrature points of that order; InputError for one turned inside out."""
     geometry = mapping(chunk.kind, points, chunk.nodes)
-    X, weights = get_quadrature(geometry.elem.refdom, order[chunk.kind])
+    X, weights = quadrature(chunk.kind, order[chunk.kind])
     least = determinants(geometry, X).min(axis=1)
     worst = int(np.argmin(least))
     if not least[worst] > 0:

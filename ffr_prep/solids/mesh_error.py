@@ -18,12 +18,11 @@ from collections.abc import Sequence
 from functools import cache, partial
 
 import numpy as np
-from skfem.quadrature import get_quadrature
 
 from ffr_prep.body import TENSOR
 from ffr_prep.common.arrays import Array
 from ffr_prep.mesh.mesh import Mesh, boundary_faces, region_nodes
-from ffr_prep.mesh.shapes import local_order, shape_functions
+from ffr_prep.mesh.shapes import local_order, quadrature, shape_functions
 from ffr_prep.solids.assembly import STIFFNESS_ORDER, Chunk, Materials, chunks, displacement_gradients
 from ffr_prep.solids.stress_modes import elastic_materials, nodal_stress, picked
 from ffr_prep.solvers.threads import ahead
@@ -70,7 +69,7 @@ def _of_chunk(points: Array, smooth: Array, fields: Array, chunk: Chunk) -> Arra
 def _at_points(kind: str) -> Array:
     """(Q, k) shape functions at the points of the stiffness rule."""
     element = shape_functions(kind)
-    X, _ = get_quadrature(element.refdom, STIFFNESS_ORDER[kind])
+    X, _ = quadrature(kind, STIFFNESS_ORDER[kind])
     return np.stack([np.broadcast_to(element.lbasis(X, i)[0], X.shape[1]) for i in local_order(kind)], axis=-1)
 
 

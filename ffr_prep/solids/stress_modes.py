@@ -25,14 +25,13 @@ from functools import cache, partial
 
 import numpy as np
 import scipy.sparse as sp
-from skfem.quadrature import get_quadrature
 
 from ffr_prep.body import TENSOR, Surface
 from ffr_prep.common.arrays import Array
 from ffr_prep.mesh.boundary import outer_faces
 from ffr_prep.mesh.cells import FACE_TRIANGLES, KINDS
 from ffr_prep.mesh.mesh import Block, Mesh, surface_triangles
-from ffr_prep.mesh.shapes import local_order, shape_functions
+from ffr_prep.mesh.shapes import local_order, quadrature, shape_functions
 from ffr_prep.solids.assembly import (
     STIFFNESS_ORDER,
     Chunk,
@@ -49,6 +48,7 @@ AVERAGING = (
     "the elements of one material"
 )
 _ROWS, _COLUMNS = np.array(TENSOR).T
+_LINEAR = {4: "tet4", 5: "pyramid5", 6: "wedge6", 8: "hex8"}  # by corners
 
 
 def boundary(mesh: Mesh, Phi: Array) -> Surface:
@@ -135,7 +135,7 @@ def extrapolation(kind: str) -> Array:
 
     Hinton & Campbell (1974): least squares of the corners' shape functions, with the weights of the rule.
     """
-    X, weights = get_quadrature(shape_functions(kind).refdom, STIFFNESS_ORDER[kind])
+    X, weights = quadrature(kind, STIFFNESS_ORDER[kind])
     if weights.size == 1:
         return np.ones((KINDS[kind].size, 1))
     at_points, at_nodes = _corner_functions(kind, X), _corner_functions(kind, KINDS[kind].nodes.T)
@@ -145,7 +145,7 @@ def extrapolation(kind: str) -> Array:
 
 def _corner_functions(kind: str, X: Array) -> Array:
     """(p, c) shape functions of the corners at X (3, p) of the reference element."""
-    linear = "tet4" if KINDS[kind].corners == 4 else "hex8"
+    linear = _LINEAR[KINDS[kind].corners]
     element = shape_functions(linear)
     return np.stack([np.broadcast_to(element.lbasis(X, i)[0], X.shape[1]) for i in local_order(linear)], axis=-1)
 

@@ -6,7 +6,7 @@ import gmsh
 import numpy as np
 import pytest
 import skfem
-from boxes import KINDS, STEEL, box_inertia, box_mesh, moved, rigid_motions, rotation, shaken
+from boxes import KINDS, PLAIN, STEEL, box_inertia, box_mesh, moved, rigid_motions, rotation, shaken
 from skfem.helpers import dot
 from skfem.models.elasticity import lame_parameters, linear_elasticity
 
@@ -102,7 +102,7 @@ def scikit_fem_basis(mesh, kind, order):
     return basis, 3 * distance.argmin(axis=1) + component
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", PLAIN)
 def test_matrices_equal_those_of_scikit_fem(kind):
     mesh = shaken(box_mesh(kind, tuple(SIZE), (2, 2, 2)), 0.02)
     matrices = assemble(mesh, STEEL)
@@ -135,7 +135,8 @@ def assert_inertia_of_box(mesh, R, centre, rel):
 @pytest.mark.parametrize("kind", KINDS)
 def test_inertia_of_a_turned_and_distorted_box(kind):
     R, by = rotation(5), np.array([0.4, -1.2, 2.0])
-    mesh = moved(shaken(box_mesh(kind, tuple(SIZE), (4, 3, 3)), 0.03), R, by)
+    amplitude = 0.01 if kind.startswith("pyramid") else 0.03  # six to a cell are flat
+    mesh = moved(shaken(box_mesh(kind, tuple(SIZE), (4, 3, 3)), amplitude), R, by)
     assert_inertia_of_box(mesh, R, R @ SIZE / 2 + by, 1e-12)
 
 

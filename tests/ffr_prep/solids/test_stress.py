@@ -13,6 +13,7 @@ import ffr_prep as fp
 from ffr_prep.body import TENSOR, BodyError, load_body, save_body, truncated, with_point
 from ffr_prep.mesh.cells import KINDS as ELEMENTS
 from ffr_prep.mesh.mesh import surface_triangles
+from ffr_prep.mesh.shapes import quadrature
 from ffr_prep.model.coupled import InterfaceRegion
 from ffr_prep.model.material import Material
 from ffr_prep.model.reference import FixedTo, functionals
@@ -80,7 +81,7 @@ def test_rigid_motions_and_turned_axes(kind):
 
 @pytest.mark.parametrize("kind", [kind for kind in KINDS if kind != "tet4"])
 def test_the_extension_to_the_nodes_keeps_what_the_fit_contains(kind):
-    X, _ = get_quadrature(getattr(skfem, ELEMENTS[kind].shapes)().refdom, STIFFNESS_ORDER[kind])
+    X, _ = quadrature(kind, STIFFNESS_ORDER[kind])
     fields = [lambda x: 1 + x[0] - 2 * x[1] + 3 * x[2]]
     fields += [lambda x: x[0] * x[1], lambda x: x[0] * x[1] * x[2]] if kind.startswith("hex") else []
     for f in fields:
