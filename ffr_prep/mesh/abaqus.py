@@ -33,8 +33,12 @@ _TET_FACES = ((0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0))
 _HEX_FACES = ((0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0))
 _WEDGE_FACES = ((0, 1, 2), (3, 5, 4), (0, 3, 4, 1), (1, 4, 5, 2), (2, 5, 3, 0))
 _PYRAMID_FACES = ((0, 1, 2, 3), (0, 4, 1), (1, 4, 2), (2, 4, 3), (3, 4, 0))
-_FACES = dict.fromkeys((4, 10), _TET_FACES) | dict.fromkeys((8, 20, 27), _HEX_FACES)
-_FACES |= dict.fromkeys((6, 15), _WEDGE_FACES) | dict.fromkeys((5, 13), _PYRAMID_FACES)
+_FACES: dict[int, tuple[tuple[int, ...], ...]] = {
+    **dict.fromkeys((4, 10), _TET_FACES),
+    **dict.fromkeys((5, 13), _PYRAMID_FACES),
+    **dict.fromkeys((6, 15), _WEDGE_FACES),
+    **dict.fromkeys((8, 20, 27), _HEX_FACES),
+}
 _HEX27 = [*range(20), 26, 24, 23, 25, 21, 22, 20]
 _SOLID = re.compile(r"(?:C3D|DC3D)(\d+)(V?)")  # V: as many nodes in the faces as there are
 _PLANE = re.compile(r"(?:S|SC|STRI|CPS|CPE|CPEG|CAX|M3D|SFM3D|R3D|DS|DC2D)(3|4|6|8|9|65)(?!\d)")
