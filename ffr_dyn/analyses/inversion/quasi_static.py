@@ -13,6 +13,7 @@ them than they ask for: they are what rigid bodies do not meet, of the size of t
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -36,7 +37,11 @@ from ffr_prep.common.errors import ComputationError
 ITERATIONS = 30
 TOLERANCE = 1e-12  # of a change of s, relative to its size or to one that strains the body by STRAINED
 STRAINED, BENT = 1e-6, 1e-2  # q over size and root of mass of a body: the least by which changes and differences go
-ROUNDING = 1e-10  # relative as well, of a change that another one follows: what is left is rounding
+ROUNDING = (
+    1e-9  # relative as well, of a change that another one follows, or that gets no shorter: what is left is rounding
+)
+SHARES = tuple(2.0**-k for k in range(8))
+SLOW = 0.5  # of the change before, from where a new tangent is worth its time
 DIFFERENCE = 1e-6
 
 
@@ -156,24 +161,39 @@ def _deformed(posed: _Posed, s: Array, tangent: Array | None) -> tuple[Array, Ar
     """Deformation with vanishing elastic accelerations, and the tangent that found it, to be tried again at the next time."""
     if s.size == 0:
         return s, np.zeros((0, 0))
-    before = np.inf
+    before, residual = np.inf, _pose(posed, s)
     for _ in range(ITERATIONS):
-        residual = _pose(posed, s)
-        if tangent is None:
-            tangent = _tangent(posed, s)
+        fresh = tangent is None
+        tangent = _tangent(posed, s) if tangent is None else tangent
         step = np.linalg.solve(tangent, residual)
-        s = s - step
         size = float(np.abs(step).max())
         scale = max(float(np.abs(s).max()), STRAINED)
         if size < TOLERANCE * scale or before < ROUNDING * scale:
+            return s - step, tangent
+        found = _stepped(posed, s, step, tangent)
+        if found is None and size < ROUNDING * scale:
             return s, tangent
-        if size > 0.1 * before:
-            tangent = None
+        if found is None and fresh:
+            break
+        s, residual = found or (s, residual)
+        tangent = None if found is None or size > SLOW * before else tangent
         before = size
     raise ComputationError(
         f"at t = {posed.time:.6g} s no quasi-static deformation was found: the load is near to buckling a body, or the "
         "elastic forces are not finite; use elastic=Dynamic()"
     )
+
+
+def _stepped(posed: _Posed, s: Array, step: Array, tangent: Array) -> tuple[Array, Array] | None:
+    """Deformation and its accelerations after the longest share of a step whose next one, by the same tangent, is shorter;
+    None where there is none. (Natural monotonicity: P. Deuflhard, Newton Methods for Nonlinear Problems, 2004, 3.3.)"""
+    size = np.abs(step).max()
+    for share in SHARES:
+        with suppress(ComputationError):
+            residual = _pose(posed, s - share * step)
+            if np.abs(np.linalg.solve(tangent, residual)).max() <= (1 - share / 4) * size:
+                return s - share * step, residual
+    return None
 
 
 def _tangent(posed: _Posed, s: Array) -> Array:

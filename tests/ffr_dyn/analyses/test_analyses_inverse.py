@@ -16,6 +16,8 @@ from ffr_dyn.analyses.inverse import Dynamic, QuasiStatic, inverse
 from ffr_dyn.analyses.kinematic import kinematic
 from ffr_dyn.analyses.mixed import mixed
 from ffr_dyn.analyses.static import static
+from ffr_dyn.consistency.assemble import assemble
+from ffr_dyn.consistency.evaluation import evaluate, evaluator
 from ffr_dyn.functions.rotation import rotation_matrix
 from ffr_dyn.functions.time_functions import harmonic, polynomial
 from ffr_dyn.integrators import RK4
@@ -221,6 +223,23 @@ def test_a_propped_cantilever_that_is_turned_ever_faster(plane):
     found = inverse(scene, end=0.02, output_step=0.02, elastic=QuasiStatic())
     np.testing.assert_allclose(found["motor.effort"][0], (mass * length**2 / 3 + 0.01) * alpha, rtol=1e-5)
     np.testing.assert_allclose(found["prop.force"][0], (0, 11 / 40 * mass * alpha * length, 0), atol=4e-3)  # four modes
+
+
+def test_large_quasi_static_deformation_is_found():
+    """Whole steps of Newton's method run away from it: there the elastic accelerations are to vanish."""
+    hub, arm = flexible_arm().bodies
+    turning = (Driver("one", "A", polynomial(0.0, 5.0)), Driver("two", "B", polynomial(0.3)))
+    soft = replace(arm, model=cloud(4, stiffness=1.0))
+    scene = replace(flexible_arm(), bodies=(hub, soft), drivers=turning, gravity=(0, -9.81, 0))
+    found = inverse(scene, end=0.02, output_step=0.02, elastic=QuasiStatic(), outputs=("*",))
+    assert np.abs(found["b.q"][0]).max() > 0.5
+    at = evaluator(assemble(scene).system)
+    x = np.concatenate(
+        [found[f"{name}.{what}"][0] for name in ("hub", "b") for what in ("R", "p", "q")[: 2 + (name == "b")]]
+    )
+    v = np.concatenate([found[name][0] for name in ("hub.v", "hub.omega_bar", "b.v", "b.omega_bar", "b.q_dot")])
+    accelerations = evaluate(at, 0.0, x, v).acceleration
+    assert np.abs(accelerations[-4:]).max() < 1e-8 * np.abs(accelerations).max()
 
 
 @pytest.mark.slow
