@@ -191,13 +191,18 @@ def coordinate_gradients(scene: Scene, place: Layout, x: Array, v: Array) -> tup
 
 def named_motion(scene: Scene, place: Layout, x: Array, direction: Array) -> str:
     """The coordinate that leads a motion (V,): of a joint if one takes part, else of the body that moves most."""
+    return named_motions(scene, place, x, direction[:, None])[0]
+
+
+def named_motions(scene: Scene, place: Layout, x: Array, directions: Array) -> list[str]:
+    """The coordinates that lead motions (V, m)."""
     names, gradients = coordinate_gradients(scene, place, x, np.zeros(place.v_size))
-    bodies = np.concatenate([np.roll(direction[place.rigid(b)], 3) for b in range(len(place.n))])
-    joints = gradients @ direction
-    if np.abs(joints).max(initial=0.0) > 0.1 * np.abs(bodies).max():
-        return names[int(np.argmax(np.abs(joints)))]
-    leading = int(np.argmax(np.abs(bodies)))
-    return f"{scene.bodies[leading // 6].name} {ALONG[leading % 6]}"
+    names += [f"{body.name} {along}" for body in scene.bodies for along in ALONG]
+    parts = [np.roll(directions[place.rigid(b)], 3, axis=0) for b in range(len(place.n))]
+    joints, bodies = np.abs(gradients @ directions), np.abs(np.concatenate(parts))
+    takes_part = joints.max(axis=0, initial=0.0) > 0.1 * bodies.max(axis=0)
+    shown = np.vstack([joints * takes_part, bodies * ~takes_part])
+    return [names[k] for k in np.argmax(shown, axis=0)]
 
 
 def _motions(scene: Scene, place: Layout, x: Array, v: Array, rigid: Array, Z: Array) -> list[FreeMotion]:

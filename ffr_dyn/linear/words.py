@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ffr_dyn.consistency.mobility import named_motion
+from ffr_dyn.consistency.mobility import named_motions
 from ffr_dyn.equations.layout import Layout
 from ffr_dyn.scene.parts import owner
 from ffr_dyn.scene.scene import Scene
@@ -32,17 +32,17 @@ def in_words(
     seen     : (m,) [rad/s] frequencies, of a whirl that from the ground
     whirling : "forward" or "backward" of each mode; "" where it is no whirl
     """
-    whats = []
-    for mode, rate, way in zip(modes.T, seen, whirling, strict=True):
-        what = _elastic(scene, place, M, rate, mode)
+    whats, energies = [], seen**2 * np.sum(modes.conj() * (M @ modes), axis=0).real
+    for mode, energy, way in zip(modes.T, energies, whirling, strict=True):
+        what = _elastic(scene, place, energy, mode)
         whats.append(what and (what[0], what[1], f", {way}" if way and what[1] == "bending" else what[2]))
     found, counts, last = [""] * len(whats), Counter[tuple[str, ...]](), dict[tuple[str, ...], float]()
+    moving = [k for k, what in enumerate(whats) if what is None]
+    for k, name in zip(moving, named_motions(scene, place, x, _turned_real(modes[:, moving])), strict=True):
+        found[k] = f"{name}, {whirling[k]}" if whirling[k] else name
     for k in np.argsort(seen, kind="stable"):
-        what, mode = whats[k], modes[:, k]
+        what = whats[k]
         if what is None:
-            at = mode[int(np.argmax(np.abs(mode)))]
-            moving = named_motion(scene, place, x, (mode * np.conj(at)).real)
-            found[k] = f"{moving}, {whirling[k]}" if whirling[k] else moving
             continue
         counts[what] += not np.isclose(last.get(what, -1.0), seen[k], rtol=1e-6, atol=0.0)
         last[what] = seen[k]
@@ -50,15 +50,23 @@ def in_words(
     return tuple(found)
 
 
+def _turned_real(modes: Array) -> Array:
+    """(V, m) modes at the moment at which their largest component is largest."""
+    largest = np.take_along_axis(modes, np.argmax(np.abs(modes), axis=0)[None], axis=0)
+    return np.asarray((modes * np.conj(largest)).real)
+
+
 def _ordinal(count: int) -> str:
     return ORDINALS[count - 1] if count <= len(ORDINALS) else f"{count}th"
 
 
-def _elastic(scene: Scene, place: Layout, M: Array, rate: float, mode: Array) -> tuple[str, str, str] | None:
-    """(body, what it does, ", " and the direction) of a mode that strains a body; None of one that moves bodies."""
+def _elastic(scene: Scene, place: Layout, energy: float, mode: Array) -> tuple[str, str, str] | None:
+    """(body, what it does, ", " and the direction) of a mode that strains a body; None of one that moves bodies.
+
+    energy : [J] twice that of its motion
+    """
     strain = [b.model.omega2 @ np.abs(mode[place.q_dot(k)]) ** 2 for k, b in enumerate(scene.bodies)]
-    moving = rate**2 * float((mode.conj() @ M @ mode).real)
-    if not sum(strain) > ELASTIC * moving or moving == 0:
+    if not sum(strain) > ELASTIC * energy or energy == 0:
         return None
     k = int(np.argmax(strain))
     model = scene.bodies[k].model
