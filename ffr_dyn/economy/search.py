@@ -326,7 +326,7 @@ def _finished(ledger: Ledger, found: Chosen, verify: bool | None) -> Economy:
         allowed = ledger.policy.asked_verification if verify else ledger.policy.unasked_verification
         final, verification = verified(ledger, found.everything, found.limits, final, found.omitted, allowed)
     verifying = sum(ledger.asked.values())  # of the runs that it took, which the search may have made
-    kept, omitted = _explained(ledger, found, final)
+    kept, omitted, untold = _explained(ledger, found, final)
     names = [output.name for output in ledger.of.outputs]
     return Economy(
         original=ledger.scene,
@@ -351,7 +351,7 @@ def _finished(ledger: Ledger, found: Chosen, verify: bool | None) -> Economy:
         unmoved=() if _may_be_deaf(final) else unmoved(found.omitted, found.scales, names, ledger.policy),
         frequencies=frequencies(final, ledger.made(found.everything), found.everything, ledger.scene, ledger.policy),
         stiffening=stiffening_loads(final, ledger.policy),
-        notes=(*_notes(ledger, final), *stress_doubts(final, ledger.scene, ledger.of, found.limits)),
+        notes=(*_notes(ledger, final), *stress_doubts(final, ledger.scene, ledger.of, found.limits), *untold),
         verification=verification,
         policy=ledger.policy,
     )
@@ -395,10 +395,14 @@ def _settings(span: Span, choice: Choice, of: Probe) -> Settings:
     )
 
 
-def _explained(ledger: Ledger, found: Chosen, final: Trial) -> tuple[Contributions, Contributions]:
-    """The contributions of the modes that stay, and those that the modes left out would make."""
+def _explained(ledger: Ledger, found: Chosen, final: Trial) -> tuple[Contributions, Contributions, list[str]]:
+    """The contributions of the modes that stay, and those that the modes left out would make; a note where these cannot be
+    found: the model that is chosen stands without them."""
     ledger.tell("what is nearest to mattering")
     if not any(part.modes for part in final.choice.parts):
-        return nothing(ledger.of), found.omitted
-    kept = of_motion(ledger, final, found.limits, own(ledger, final))
-    return kept, of_omitted(ledger, final, found.everything, found.limits)
+        return nothing(ledger.of), found.omitted, []
+    try:
+        kept = of_motion(ledger, final, found.limits, own(ledger, final))
+        return kept, of_omitted(ledger, final, found.everything, found.limits), []
+    except ComputationError as error:
+        return nothing(ledger.of), found.omitted, [f"what each mode of the chosen model does is not told: {error}"]

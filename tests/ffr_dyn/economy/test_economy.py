@@ -444,6 +444,19 @@ def fast():
     return economise(scene, ("slider.pin.position.x", "rod.stress=40%"), end=0.063, output_step=0.0007, tolerance=1e-2)
 
 
+def test_a_model_is_told_even_where_what_its_modes_do_cannot_be(monkeypatch):
+    def failing(*_):
+        raise ComputationError("at t = 0.3 s the position is singular")
+
+    monkeypatch.setattr("ffr_dyn.economy.search.of_motion", failing)
+    found = economise(swung(), ["rod.b.position.x"], end=0.1, output_step=0.01, tolerance=1e-9, verify=False)
+    assert any(part.modes for part in found.choice.parts)
+    assert (
+        found.notes[-1] == "what each mode of the chosen model does is not told: at t = 0.3 s the position is singular"
+    )
+    as_text(found)
+
+
 @pytest.fixture(scope="module")
 def fine():
     """The same where stress matters finely: steps shorter than an output row, and many modes."""
