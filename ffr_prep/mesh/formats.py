@@ -57,6 +57,9 @@ MESH_FORMATS: Registry[MeshFormat] = Registry(
             (".bdf", ".nas", ".fem", ".dat"),
         ),
         MeshFormat(
+            "Ansys", ".cdb: archives of Mechanical APDL, in blocks", "ffr_prep.mesh.ansys:from_ansys", (".cdb",)
+        ),
+        MeshFormat(
             "CalculiX results",
             ".frd: the mesh of a file of results",
             "ffr_prep.mesh.frd:from_frd",

@@ -3,8 +3,8 @@
 A mesh becomes a body of solid elements alone. What else has stiffness, mass or damping, holds parts together or holds them
 fast is told with the place where it belongs: the scene, a structure file, interfaces, the matrices of the whole.
 
-Source: Abaqus Keywords Reference Guide; CalculiX CrunchiX user's manual, section "Input deck format"; MSC Nastran Quick
-Reference Guide, section 5.
+Source: Abaqus Keywords Reference Guide; Ansys Mechanical APDL Element Reference; CalculiX CrunchiX user's manual, section
+"Input deck format"; MSC Nastran Quick Reference Guide, section 5.
 """
 
 from __future__ import annotations
@@ -88,6 +88,26 @@ _NASTRAN = (
 )
 
 
+# Numbers of element types, and commands.
+_ANSYS = (
+    _Kind(r"14|37|38|39|40|214|250", *_SPRINGS),
+    _Kind(r"21|71", *_MASSES),
+    _Kind(r"3|4|8|10|1[168]|2[034]|44|54|59|16[01]|180|188|189|28[89]|290", *_BEAMS),
+    _Kind(r"28|41|43|63|91|93|99|150|181|208|209|281", *_SHELLS),
+    _Kind(r"184|CE|CERIG|CP", *_RIGID),
+    _Kind(r"52|169|17\d", *_JOINED),
+    _Kind(r"D|DSYM", *_SUPPORTS),
+    _Kind(r"15[1-6]|F|SF|SFE|SFBEAM|BF|BFE|BFBLOCK|SFEBLOCK", *_LOADS),
+    _Kind(r"29|30|220|221", *_FLUID),
+    _Kind(r"27|50", *_MATRICES),
+)
+
+
+def left_out_of_ansys(found: Mapping[str, int]) -> tuple[str, ...]:
+    """Notes on elements of an archive by the number of their type, and on commands, by how many of each there are."""
+    return _told({f"of type {name}" if name.isdecimal() else name: count for name, count in found.items()}, _ANSYS)
+
+
 def left_out_of_abaqus(found: Mapping[str, int]) -> tuple[str, ...]:
     """Notes on keywords ("*TIE") and types of elements ("B31") of a deck, by how many of each there are."""
     return _told(found, _ABAQUS)
@@ -101,7 +121,7 @@ def left_out_of_nastran(found: Mapping[str, int]) -> tuple[str, ...]:
 def _told(found: Mapping[str, int], kinds: tuple[_Kind, ...]) -> tuple[str, ...]:
     notes = []
     for kind in kinds:
-        here = [name for name in found if re.fullmatch(kind.names, name)]
+        here = [name for name in found if re.fullmatch(kind.names, name.removeprefix("of type "))]
         if here:
             notes.append(f"{', '.join(f'{found[name]} {name}' for name in here)} left out: {kind.what}; {kind.remedy}")
     return tuple(notes)

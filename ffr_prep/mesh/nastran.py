@@ -63,7 +63,7 @@ def from_nastran(path: Path) -> FileMesh:
         if not deck.grids:
             raise InputError(
                 "it has no GRID: is it Nastran bulk data? Meshes of other programs with this ending, as Ansys has .dat, are "
-                "not read: save them as .msh, .med, .unv, .inp, .bdf or .vtu"
+                "not read: save them as .cdb, .msh, .med, .unv, .inp, .bdf or .vtu"
             )
         return _file_mesh(deck)
     except InputError as error:
