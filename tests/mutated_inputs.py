@@ -163,6 +163,33 @@ PSOLID,1,1
 MAT1,1,2.1+11,,.3,7850.
 ENDDATA
 """
+CDB = """/UNITS,SI
+/PREP7
+ET,1,185
+ET,2,21
+NBLOCK,6,SOLID,        9,        9
+(3i9,6e21.13e3)
+        1        0        0
+        2        0        0  1.0000000000000E+00
+        3        0        0  1.0000000000000E+00  1.0000000000000E+00
+        4        0        0  0.0000000000000E+00  1.0000000000000E+00
+        5        0        0  0.0000000000000E+00  0.0000000000000E+00  1.0000000000000E+00
+        6        0        0  1.0000000000000E+00  0.0000000000000E+00  1.0000000000000E+00
+        7        0        0  1.0000000000000E+00  1.0000000000000E+00  1.0000000000000E+00
+        8        0        0  0.0000000000000E+00  1.0000000000000E+00  1.0000000000000E+00
+        9        0        0  5.0000000000000E-01  5.0000000000000E-01  2.0000000000000E+00
+N,UNBL,LOC,       -1,
+EBLOCK,19,SOLID,        3,        3
+(19i9)
+        1        1        1        1        0        0        0        0        8        0        1        1        2        3        4        5        6        7        8
+        1        1        1        1        0        0        0        0        8        0        2        5        6        7        8        9        9        9        9
+        1        2        1        1        0        0        0        0        1        0        3        9
+       -1
+CMBLOCK,TOP,NODE,       2
+(8i10)
+         5        -8
+FINISH
+"""  # noqa: E501
 FRD = """    1C
     2C                             4                                     1
  -1         1 0.00000E+00 0.00000E+00 0.00000E+00
@@ -365,6 +392,7 @@ def _write_meshes(folder: Path, mesh, meshio) -> None:
     corners.write(folder / "mesh.vtk")
     (folder / "fields.bdf").write_text(BULK)
     (folder / "mesh.frd").write_text(FRD)
+    (folder / "mesh.cdb").write_text(CDB)
     plain.write(folder / "mesh.msh", file_format="gmsh", binary=False)
     corners.write(folder / "binary.msh", file_format="gmsh", binary=True)
     nodes = [f"{k}, {', '.join(map(str, at))}" for k, at in enumerate(mesh.points, 1)]
@@ -453,6 +481,7 @@ def formats() -> dict[str, tuple[tuple[str, ...], Callable[[Path], object]]]:
         "STEP text": (("part.step",), lambda path: told_of_step(path.read_text(errors="replace"))),
         "Abaqus mesh": (("mesh.inp",), with_materials),
         "Nastran": (("mesh.bdf", "fields.bdf"), with_materials),
+        "Ansys": (("mesh.cdb",), lambda path: check_mesh(read_mesh(path))),
         "CalculiX": (("mesh.frd",), lambda path: check_mesh(read_mesh(path))),
         "meshio": (("mesh.vtu", "mesh.vtk", "mesh.mesh"), lambda path: check_mesh(read_mesh(path))),
         "gmsh": (("mesh.msh", "binary.msh"), lambda path: check_mesh(read_mesh(path))),

@@ -63,9 +63,7 @@ def from_ansys(path: Path) -> FileMesh:
             begun = command[0]
             _take(archive, command[1], lines)
         if not archive.nodes:
-            raise InputError(
-                "it has no NBLOCK: is it an archive as CDWRITE writes it, in blocks (CDWRITE,DB,name,cdb)?"
-            )
+            raise InputError("it has no NBLOCK: is it an archive of Ansys? Write it in blocks (CDWRITE,DB,name,cdb)")
         return _file_mesh(archive)
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
@@ -169,7 +167,7 @@ def _solid(number: int, nodes: list[int]) -> tuple[str, list[int]]:
     pattern = tuple(nodes[:8].index(node) for node in nodes[:8])
     if pattern not in _COLLAPSED:
         raise InputError(
-            f"element {number} is a brick collapsed in a way that is no wedge, pyramid or tetrahedron: {nodes[:8]}"
+            f"element {number} is a brick whose corners {nodes[:8]} make no wedge, pyramid or tetrahedron: write each apart"
         )
     first, second, of = _COLLAPSED[pattern]
     return (first, [nodes[k] for k in of if k < 8]) if len(nodes) == 8 else (second, [nodes[k] for k in of])
