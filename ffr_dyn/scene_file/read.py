@@ -23,7 +23,7 @@ is run.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import fields, replace
 from difflib import get_close_matches
 from functools import cache
@@ -197,7 +197,8 @@ def _scene(entry: Any, source: Source, given: Mapping[str, str | Path | Flexible
         for table, kinds in tables().items()
     }
     _put_markers(entry, source)
-    bodies = tuple(_body(name, body, given.get(name, body.file), source) for name, body in entry.bodies.items())
+    read = cache(load_body)  # bodies of one file are one, and are prepared once
+    bodies = tuple(_body(name, body, given.get(name, body.file), source, read) for name, body in entry.bodies.items())
     try:
         scene = Scene(bodies=bodies, **{key: getattr(entry, key) for key in WHOLE}, **declared)
         for force in forces_of(scene):
@@ -277,11 +278,17 @@ def _plain(function: TimeFunction) -> float | TimeFunction:
     return function.data[0] if is_constant(function) else function
 
 
-def _body(name: str, entry: BodyEntry, file: str | Path | FlexibleBody | None, source: Source) -> Body:
+def _body(
+    name: str,
+    entry: BodyEntry,
+    file: str | Path | FlexibleBody | None,
+    source: Source,
+    read: Callable[[str | Path], FlexibleBody],
+) -> Body:
     try:
         return Body(
             name,
-            _model(name, entry, file),
+            _model(name, entry, file, read),
             position=entry.position,
             rotation=entry.rotation,
             velocity=entry.velocity,
@@ -296,10 +303,15 @@ def _body(name: str, entry: BodyEntry, file: str | Path | FlexibleBody | None, s
         raise InputError(f"{origin(source, ('bodies', name))}: bodies.{name}: {error}") from None
 
 
-def _model(name: str, entry: BodyEntry, file: str | Path | FlexibleBody | None) -> FlexibleBody:
+def _model(
+    name: str,
+    entry: BodyEntry,
+    file: str | Path | FlexibleBody | None,
+    read: Callable[[str | Path], FlexibleBody],
+) -> FlexibleBody:
     points = {key: np.array(at) for key, at in entry.points.items()}
     if file is not None:
-        model = file if isinstance(file, FlexibleBody) else load_body(file)
+        model = file if isinstance(file, FlexibleBody) else read(file)
         model = model if entry.modes is None else truncated(model, entry.modes)
         alpha, beta = entry.rayleigh or (0.0, 0.0)
         bands = [(frequency, ratio) for frequency, ratio in entry.damping_bands]

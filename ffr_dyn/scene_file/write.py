@@ -42,7 +42,7 @@ _BARE = set("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-")
 
 
 def save_scene(scene: Scene, settings: Settings | MomentSettings, path: str | Path) -> Path:
-    """Write a scene file, and beside it a body file <file>.<body>.ffr for every flexible body.
+    """Write a scene file, and beside it a body file <file>.<body>.ffr for every flexible body; bodies of one model share it.
 
     Raises InputError for a Python function in the scene, which a file cannot hold, ComputationError where the file
     cannot be written.
@@ -51,11 +51,12 @@ def save_scene(scene: Scene, settings: Settings | MomentSettings, path: str | Pa
     """
     path = Path(path)
     bodies = as_declared(scene.bodies)
-    files = {body.name: f"{path.stem}.{body.name}.ffr" for body in bodies if not _is_plain(body.model)}
+    models = {id(body.model): (body.model, f"{path.stem}.{body.name}.ffr") for body in reversed(bodies)}
+    files = {body.name: models[id(body.model)][1] for body in bodies if not _is_plain(body.model)}
     text = to_toml(scene, settings, files)
-    for body in bodies:
-        if body.name in files:
-            save_body(body.model, path.parent / files[body.name])
+    for model, file in models.values():
+        if file in files.values():
+            save_body(model, path.parent / file)
     _replace(path, text)
     return path
 

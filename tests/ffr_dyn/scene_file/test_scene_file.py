@@ -605,6 +605,16 @@ def test_formulas_of_the_motion_survive(tmp_path):
     assert again.loads == scene.loads
 
 
+def test_bodies_of_one_model_share_a_file_and_are_one_again(tmp_path):
+    one, other = cloud(3, seed=1), cloud(3, seed=2)
+    bodies = [Body(name, model) for name, model in (("a", one), ("b", other), ("c", one))]
+    path = save_scene(Scene(tuple(bodies)), SETTINGS, tmp_path / "s.toml")
+    assert sorted(file.name for file in tmp_path.glob("*.ffr")) == ["s.a.ffr", "s.b.ffr"]
+    first, second, third = (body.model for body in load_scene(path)[0].bodies)
+    assert first is third
+    np.testing.assert_array_equal(second.omega2, other.omega2)
+
+
 @pytest.mark.parametrize(
     ("change", "words"),
     [
