@@ -174,7 +174,10 @@ def _settled(
         x, v = _with_rates(search, time, x, v, motion.rate)
         step = -np.linalg.solve(tangent, search.too_much(time, x, v, motion.acceleration))
         size = float(np.linalg.norm(step))
-        least = max(float(np.linalg.norm(x[search.places])), LEAST, FAINT * search.inertial)
+        q = x[search.places]
+        least = max(
+            float(np.linalg.norm(q)), float(np.linalg.norm(search.amplitudes(q))), LEAST, FAINT * search.inertial
+        )
         slow = size > SLOW * before
         if size <= (ROUNDING if slow else TOLERANCE) * least:
             return x, v, tangent

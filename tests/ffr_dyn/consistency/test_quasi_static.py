@@ -11,6 +11,7 @@ from test_dyn_plane import rod, slider_crank
 
 import ffr_dyn as fd
 from ffr_dyn.analyses.integration import integrate
+from ffr_dyn.analyses.trials import begin
 from ffr_dyn.chart.runner import Job, perform
 from ffr_dyn.chart.variants import Model, Variant
 from ffr_dyn.consistency.assemble import assemble
@@ -21,7 +22,7 @@ from ffr_dyn.functions.time_functions import polynomial
 from ffr_dyn.scene.drivers import Driver
 from ffr_dyn.scene.joints import Joint
 from ffr_dyn.scene.scene import Body, Scene
-from ffr_prep.common.errors import InputError
+from ffr_prep.common.errors import ComputationError, InputError
 
 
 def rotor(speed: float, *, stiffening: bool, **changes) -> fd.Scene:
@@ -160,3 +161,21 @@ def test_a_motion_that_is_too_fast_is_told_what_else_there_is():
     assert any(
         "not slow" in note and 'begin = "steady" starts a scene that rests in its equilibrium' in note for note in notes
     )
+
+
+@pytest.mark.parametrize("driven", [True, False])
+def test_where_the_start_leads_nowhere_the_search_begins_from_where_the_driven_scene_rests(driven, monkeypatch):
+    def failing(assembled, time):
+        if not assembled.x[7:].any():  # undeformed
+            raise ComputationError("no quasi-static deflections were found")
+        return quasi_static(assembled, time)
+
+    scene = rotor(10.0, stiffening=False, gravity=(0, -9.81, 0), **({} if driven else {"drivers": ()}))
+    start = assemble(scene)
+    monkeypatch.setattr(begin, "quasi_static", failing)
+    if driven:
+        found = begin.begun(start, 0.0, "quasi-static")
+        np.testing.assert_allclose(found.x, quasi_static(start, 0.0).x, atol=1e-9 * np.abs(found.x[7:]).max())
+    else:
+        with pytest.raises(ComputationError, match="no quasi-static"):
+            begin.begun(start, 0.0, "quasi-static")
