@@ -7,6 +7,12 @@ from typing import Any
 
 MESH_ERROR = "mesh_error"  # of the provenance
 TOLD = 0.02  # of the lowest frequency, from where on it is told unasked
+_FINER = {  # by what the record of the model has
+    "mesh": "reduce it with smaller elements or with those of second order (`ffr-prep reduce --size`, `--order 2`; a file "
+    "that is a mesh already is made finer by the program that wrote it)",
+    "shells": "give its sheets more elements across their width, or quadrilaterals in place of triangles, which are much "
+    "stiffer in their plane",
+}
 
 
 def mesh_errors_of(provenance: Mapping[str, Any]) -> dict[int, float]:
@@ -21,8 +27,15 @@ def mesh_doubt(provenance: Mapping[str, Any]) -> str | None:
     if first < TOLD:
         return None
     percent = f"{100 * first:.{0 if first >= 0.1 else 1}f}"
-    return (
-        f"its mesh is too coarse: the lowest frequency is about {percent} % too high; reduce it with smaller "
-        "elements or with those of second order (`ffr-prep reduce --size`, `--order 2`; a file that is a mesh already is "
-        "made finer by the program that wrote it)"
-    )
+    remedies = [remedy for key, remedy in _FINER.items() if _has(provenance, key)]
+    return f"its mesh is too coarse: the lowest frequency is about {percent} % too high; {', and '.join(remedies)}"
+
+
+def made_of_plates(provenance: Mapping[str, Any]) -> bool:
+    """Whether plates are in the model, of whose bending the error is not known."""
+    return _has(provenance, "shells")
+
+
+def _has(record: Mapping[str, Any], key: str) -> bool:
+    """Whether a model, or a part of it, has the entry in its record."""
+    return bool(record.get(key)) or any(_has(part, key) for part in record.get("parts", {}).values())
