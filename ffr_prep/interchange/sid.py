@@ -88,8 +88,8 @@ def left_out(body: FlexibleBody, *, layout: Layout = "mode-major") -> tuple[str,
         return ()
     return (
         "Oe.m1 holds the inertia of the shapes and the geometric stiffness of spin as one sum, as the format has it: a "
-        "program that wants the inertia alone, for how the deflection changes moments of inertia (I9), takes it from masses at "
-        "the nodes, as `ffr-prep import` does. A .fem file holds both",
+        "program that wants the inertia alone, for how the deflection changes moments of inertia (I9), takes it from masses "
+        "at the nodes, as `ffr-prep import` does. A .fem file holds both",
     )
 
 
