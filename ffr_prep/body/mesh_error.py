@@ -28,7 +28,8 @@ def mesh_doubt(provenance: Mapping[str, Any]) -> str | None:
         return None
     percent = f"{100 * first:.{0 if first >= 0.1 else 1}f}"
     remedies = [remedy for key, remedy in _FINER.items() if _has(provenance, key)]
-    return f"its mesh is too coarse: the lowest frequency is about {percent} % too high; {', and '.join(remedies)}"
+    remedy = ", and ".join(remedies or _FINER.values())
+    return f"its mesh is too coarse: the lowest frequency is about {percent} % too high; {remedy}"
 
 
 def made_of_plates(provenance: Mapping[str, Any]) -> bool:

@@ -222,7 +222,11 @@ def _reduced(model: Model, request: Request, progress: Stages, advance: Advance)
             progress("compute the second order of the surface")
             drawn = replace(basis, Z=basis.Z[:, : request.drawn_modes], omega2=basis.omega2[: request.drawn_modes])
             surface = with_second_order(surface, model, held, request.reference, drawn, advance)
-    found = [mesh_doubt(of_mesh), steady_stress_doubt(of_stress), shear_doubt(model.record) if request.stress else None]
+    found = [
+        mesh_doubt({**model.record, **of_mesh}),
+        steady_stress_doubt(of_stress),
+        shear_doubt(model.record) if request.stress else None,
+    ]
     doubts = [*model.doubts(basis.Z), *filter(None, found)]
     made = FlexibleBody(
         name=request.name,
