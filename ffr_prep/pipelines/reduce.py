@@ -36,6 +36,7 @@ from ffr_prep.model.reference import ReferenceConditions, at_interfaces, conditi
 from ffr_prep.reduction.basis import Basis, Reduction, check_basis, factorised
 from ffr_prep.reduction.held_body import held_body, needs_held_body
 from ffr_prep.reduction.mesh_error import mesh_error
+from ffr_prep.reduction.mesh_resolution import sheet_doubt
 from ffr_prep.reduction.quality import assess, completed
 from ffr_prep.reduction.second_order import check_size, with_second_order
 from ffr_prep.reduction.selection import Band
@@ -222,12 +223,7 @@ def _reduced(model: Model, request: Request, progress: Stages, advance: Advance)
             progress("compute the second order of the surface")
             drawn = replace(basis, Z=basis.Z[:, : request.drawn_modes], omega2=basis.omega2[: request.drawn_modes])
             surface = with_second_order(surface, model, held, request.reference, drawn, advance)
-    found = [
-        mesh_doubt({**model.record, **of_mesh}),
-        steady_stress_doubt(of_stress),
-        shear_doubt(model.record) if request.stress else None,
-    ]
-    doubts = [*model.doubts(basis.Z), *filter(None, found)]
+    doubts = _doubts(model, basis, of_mesh, of_stress, stress=request.stress)
     made = FlexibleBody(
         name=request.name,
         omega2=basis.omega2,
@@ -243,6 +239,19 @@ def _reduced(model: Model, request: Request, progress: Stages, advance: Advance)
         warnings.append(_UNDEFORMED)
     made = replace(made, provenance={**made.provenance, "warnings": list(dict.fromkeys(warnings))})
     return _with_held_body(made, model, body, progress)
+
+
+def _doubts(
+    model: Model, basis: Basis, of_mesh: Mapping[str, Any], of_stress: Mapping[str, Any], *, stress: bool
+) -> list[str]:
+    """What model, mesh and shapes cannot be trusted with, in words."""
+    found = [
+        mesh_doubt({**model.record, **of_mesh}),
+        sheet_doubt(model.record, model.coupled, basis.Z),
+        steady_stress_doubt(of_stress),
+        shear_doubt(model.record) if stress else None,
+    ]
+    return [*model.doubts(basis.Z), *filter(None, found)]
 
 
 def _with_held_body(made: FlexibleBody, model: Model, body: FreeBody, progress: Stages) -> FlexibleBody:

@@ -156,6 +156,21 @@ def test_a_body_of_plates_tells_it_and_a_coarse_one_warns_with_what_helps():
         assert line.endswith("in brackets the mode; of plates without their bending")
 
 
+@pytest.mark.parametrize(("elements", "told"), [(4, True), (8, False)])
+def test_a_clamped_plate_of_few_elements_says_that_its_bending_may_be_off(elements, told):
+    """35.99 sqrt(D / (rho t a^4)): Leissa, Vibration of Plates (1969), section 4.3.1."""
+    shell = fp.Shell(0.01, METAL)
+    plate = fp.panel([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)], shell, elements=(elements, elements))
+    rim = np.flatnonzero((np.abs(plate.points[:, :2] - 0.5) > 0.4999).any(axis=1))
+    model = fp.from_frame(replace(plate, node_groups={"rim": rim}), [fp.InterfaceRegion("rim")])
+    request = fp.Request(name="b", reference=fp.FixedTo("rim"), reduction=fp.Eigenmodes(1), linear=True)
+    body = fp.reduce(model, request)
+    D = METAL.E * shell.thickness**3 / (12 * (1 - METAL.nu**2))
+    off = body.frequencies[0] / (35.99 / (2 * np.pi) * np.sqrt(D / (METAL.rho * shell.thickness))) - 1
+    assert any("elements per wavelength" in warning for warning in body.provenance["warnings"]) is told
+    assert bool(abs(off) > 0.03) is told
+
+
 def test_both_remedies_are_told_of_solids_with_plates():
     record = {"mesh_error": {"modes": [1], "too_high": [0.1]}, "parts": {"a": {"shells": [1]}, "b": {"mesh": {"k": 1}}}}
     assert "smaller elements" in mesh_doubt(record)
