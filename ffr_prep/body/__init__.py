@@ -56,7 +56,7 @@ from ffr_prep.body.steady_stress import (
     shear_doubt,
     steady_stress_doubt,
 )
-from ffr_prep.body.units_doubt import units_doubts
+from ffr_prep.body.units_doubt import ratio_doubts, units_doubts
 
 __all__ = [
     "CUT_ERROR",
@@ -113,6 +113,7 @@ __all__ = [
     "of_plane",
     "pair_values",
     "paired",
+    "ratio_doubts",
     "reach_of",
     "recombined",
     "recoordinated",

@@ -136,7 +136,7 @@ def reduce(
     try:
         whole = _reduced(model, request, progress, advance)
         whole = _with_cut_error(replace(whole, parts=tuple(_parts(parts, request, progress, advance))))
-        return with_damping(whole, request.damping)
+        return _with_doubts(with_damping(whole, request.damping))
     except ComputationError:
         model.diagnose()
         _check_points(model.coupled)
@@ -234,11 +234,13 @@ def _reduced(model: Model, request: Request, progress: Stages, advance: Advance)
         damping=model.damping(basis.Z),
         **vars(integrals),
     )
-    warnings = [*made.provenance["warnings"], *units_doubts(made)]
-    if not made.n:
-        warnings.append(_UNDEFORMED)
-    made = replace(made, provenance={**made.provenance, "warnings": list(dict.fromkeys(warnings))})
-    return _with_held_body(made, model, body, progress)
+    return _with_held_body(_with_doubts(made), model, body, progress)
+
+
+def _with_doubts(made: FlexibleBody) -> FlexibleBody:
+    """The body with warnings of what cannot be meant of its numbers, each once."""
+    warnings = [*made.provenance["warnings"], *units_doubts(made), *([] if made.n else [_UNDEFORMED])]
+    return replace(made, provenance={**made.provenance, "warnings": list(dict.fromkeys(warnings))})
 
 
 def _doubts(
