@@ -19,7 +19,7 @@ from ffr_prep.body.fewer_modes import CUT_PAIR, KEPT, cut_pair, cut_twins, paire
 from ffr_prep.body.file import MAKE_AGAIN, content_hash, load_body, save_arrays, save_body, surface_arrays, surface_of
 from ffr_prep.body.frame_change import interface_motions, mass_of_motions
 from ffr_prep.body.mean_axis import FrameMarker, MeanAxisForm, idle_loads, mean_axis_form, mean_axis_surface
-from ffr_prep.body.mesh_error import MESH_ERROR, made_of_plates, mesh_doubt, mesh_errors_of
+from ffr_prep.body.mesh_error import CONVERTED_FROM, MESH_ERROR, made_of_plates, mesh_doubt, mesh_errors_of
 from ffr_prep.body.movable import immovable, least_inertia
 from ffr_prep.body.reduced import (
     SECTION_FORCES,
@@ -59,6 +59,7 @@ from ffr_prep.body.steady_stress import (
 from ffr_prep.body.units_doubt import ratio_doubts, units_doubts
 
 __all__ = [
+    "CONVERTED_FROM",
     "CUT_ERROR",
     "CUT_PAIR",
     "KEPT",

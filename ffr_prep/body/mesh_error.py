@@ -6,6 +6,9 @@ from collections.abc import Mapping
 from typing import Any
 
 MESH_ERROR = "mesh_error"  # of the provenance
+CONVERTED_FROM = (
+    "converted_from"  # of the provenance: the reference conditions under which a converted body was reduced
+)
 TOLD = 0.02  # of the lowest frequency, from where on it is told unasked
 _FINER = {  # by what the record of the model has
     "mesh": "reduce it with smaller elements or with those of second order (`ffr-prep reduce --size`, `--order 2`; a file "
@@ -16,7 +19,10 @@ _FINER = {  # by what the record of the model has
 
 
 def mesh_errors_of(provenance: Mapping[str, Any]) -> dict[int, float]:
-    """For each mode that was looked at, by its number from 1, how much too high its frequency is: 0.02 of 2 per cent."""
+    """For each mode that was looked at, by its number from 1, how much too high its frequency is: 0.02 of 2 per cent.
+
+    Of a converted body they are the modes under the reference conditions of its reduction.
+    """
     kept = provenance.get(MESH_ERROR, {"modes": [], "too_high": []})
     return dict(zip(kept["modes"], kept["too_high"], strict=True))
 
@@ -29,7 +35,8 @@ def mesh_doubt(provenance: Mapping[str, Any]) -> str | None:
     percent = f"{100 * first:.{0 if first >= 0.1 else 1}f}"
     remedies = [remedy for key, remedy in _FINER.items() if _has(provenance, key)]
     remedy = ", and ".join(remedies or _FINER.values())
-    return f"its mesh is too coarse: the lowest frequency is about {percent} % too high; {remedy}"
+    before = ", under the reference conditions of its reduction," if CONVERTED_FROM in provenance else ""
+    return f"its mesh is too coarse: the lowest frequency{before} is about {percent} % too high; {remedy}"
 
 
 def made_of_plates(provenance: Mapping[str, Any]) -> bool:

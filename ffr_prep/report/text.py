@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ffr_prep.body import (
+    CONVERTED_FROM,
     CUT_ERROR,
     MESH_ERROR,
     STEADY_STRESS,
@@ -170,7 +171,8 @@ def mesh_error_lines(provenance: Mapping[str, Any]) -> Iterator[str]:
     if errors := mesh_errors_of(provenance):
         each = ", ".join(f"{_percent(error)} ({mode})" for mode, error in errors.items())
         alone = "; of plates without their bending" if made_of_plates(provenance) else ""
-        yield f"mesh error  frequencies too high by about {each}; in brackets the mode{alone}"
+        before = " under the reference conditions of its reduction" if CONVERTED_FROM in provenance else ""
+        yield f"mesh error  frequencies too high by about {each}; in brackets the mode{before}{alone}"
 
 
 def damping_lines(body: FlexibleBody) -> Iterator[str]:
