@@ -34,7 +34,7 @@ from ffr_prep.model.model import Model
 from ffr_prep.model.reactions import in_equilibrium, known_loads
 from ffr_prep.model.reference import ReferenceConditions, at_interfaces, conditions_of_part, functionals
 from ffr_prep.reduction.basis import Basis, Reduction, check_basis, factorised
-from ffr_prep.reduction.held_body import held_body, needs_held_body
+from ffr_prep.reduction.held_body import held_body, needs_held_body, unshown_loads
 from ffr_prep.reduction.mesh_error import mesh_error
 from ffr_prep.reduction.mesh_resolution import sheet_doubt
 from ffr_prep.reduction.quality import assess, completed
@@ -261,7 +261,11 @@ def _with_held_body(made: FlexibleBody, model: Model, body: FreeBody, progress: 
     if model.massless or not needs_held_body(made):
         return made
     progress("look at the interfaces held")
-    return replace(made, provenance={**made.provenance, "held_body": held_body(model.coupled, body, model.inertia)})
+    held = held_body(model.coupled, body, model.inertia)
+    stressed = made.surface is not None and (made.surface.stress is not None or made.surface.beams is not None)
+    unshown = unshown_loads(made, held) if stressed else None
+    warnings = [*made.provenance["warnings"], *filter(None, [unshown])]
+    return replace(made, provenance={**made.provenance, "held_body": held, "warnings": warnings})
 
 
 # ---- basis --------------------------------------------------------------------------------------------------------
