@@ -47,6 +47,7 @@ from ffr_prep.body import (
     damping_ratio,
     free_vibrations,
     mesh_doubt,
+    ratio_doubts,
     shear_doubt,
     steady_stress_doubt,
     units_doubts,
@@ -166,7 +167,11 @@ def body_doubts(scene: Scene) -> list[str]:
     stressed = [scene.bodies[b] for b in sorted(measured)]
     doubts += [(b.name, of(b.model.provenance)) for b in stressed for of in (steady_stress_doubt, shear_doubt)]
     doubts += [(owner(b), cut_stress_doubt(b.part_of.model)) for b in stressed if b.part_of]
-    doubts += [(body.name, doubt) for body in scene.bodies for doubt in units_doubts(body.model)]
+    doubts += [
+        (body.name, doubt)
+        for body in scene.bodies
+        for doubt in (*units_doubts(body.model), *ratio_doubts(body.damping))
+    ]
     doubts += [(body.name, body.model.provenance.get(CUT_PAIR)) for body in scene.bodies if scene.plane == "none"]
     return [f"body {name!r}: {doubt}" for name, doubt in dict.fromkeys(doubts) if doubt] + _gravity_doubts(scene)
 

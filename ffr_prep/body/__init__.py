@@ -19,7 +19,7 @@ from ffr_prep.body.fewer_modes import CUT_PAIR, KEPT, cut_pair, cut_twins, paire
 from ffr_prep.body.file import MAKE_AGAIN, content_hash, load_body, save_arrays, save_body, surface_arrays, surface_of
 from ffr_prep.body.frame_change import interface_motions, mass_of_motions
 from ffr_prep.body.mean_axis import FrameMarker, MeanAxisForm, idle_loads, mean_axis_form, mean_axis_surface
-from ffr_prep.body.mesh_error import MESH_ERROR, mesh_doubt, mesh_errors_of
+from ffr_prep.body.mesh_error import CONVERTED_FROM, MESH_ERROR, made_of_plates, mesh_doubt, mesh_errors_of
 from ffr_prep.body.movable import immovable, least_inertia
 from ffr_prep.body.reduced import (
     SECTION_FORCES,
@@ -56,9 +56,10 @@ from ffr_prep.body.steady_stress import (
     shear_doubt,
     steady_stress_doubt,
 )
-from ffr_prep.body.units_doubt import units_doubts
+from ffr_prep.body.units_doubt import ratio_doubts, units_doubts
 
 __all__ = [
+    "CONVERTED_FROM",
     "CUT_ERROR",
     "CUT_PAIR",
     "KEPT",
@@ -103,6 +104,7 @@ __all__ = [
     "left_out_stress",
     "linear_surface",
     "load_body",
+    "made_of_plates",
     "mass_of_motions",
     "mean_axis_form",
     "mean_axis_surface",
@@ -112,6 +114,7 @@ __all__ = [
     "of_plane",
     "pair_values",
     "paired",
+    "ratio_doubts",
     "reach_of",
     "recombined",
     "recoordinated",

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ffr_prep.body.constructors import recombined
-from ffr_prep.body.mesh_error import MESH_ERROR, mesh_errors_of
+from ffr_prep.body.mesh_error import CONVERTED_FROM, MESH_ERROR, mesh_errors_of
 from ffr_prep.body.reduced import BodyError, FlexibleBody
 from ffr_prep.body.steady_stress import of_fewer_shapes
 from ffr_prep.common.arrays import Array
@@ -56,7 +56,7 @@ def _of_modes(provenance: Mapping[str, Any], keep: Array) -> Mapping[str, Any]:
     """With what is known of single modes under the numbers that these have among those that are kept."""
     known = mesh_errors_of(provenance)
     found = {new + 1: known[int(old) + 1] for new, old in enumerate(keep) if int(old) + 1 in known}
-    if not known:
+    if not known or CONVERTED_FROM in provenance:  # whose modes are others than those that are told of
         return provenance
     return {**provenance, MESH_ERROR: {"modes": list(found), "too_high": list(found.values())}}
 

@@ -6,11 +6,23 @@ from collections.abc import Mapping
 from typing import Any
 
 MESH_ERROR = "mesh_error"  # of the provenance
+CONVERTED_FROM = (
+    "converted_from"  # of the provenance: the reference conditions under which a converted body was reduced
+)
 TOLD = 0.02  # of the lowest frequency, from where on it is told unasked
+_FINER = {  # by what the record of the model has
+    "mesh": "reduce it with smaller elements or with those of second order (`ffr-prep reduce --size`, `--order 2`; a file "
+    "that is a mesh already is made finer by the program that wrote it)",
+    "shells": "give its sheets more elements across their width, or quadrilaterals in place of triangles, which are much "
+    "stiffer in their plane",
+}
 
 
 def mesh_errors_of(provenance: Mapping[str, Any]) -> dict[int, float]:
-    """For each mode that was looked at, by its number from 1, how much too high its frequency is: 0.02 of 2 per cent."""
+    """For each mode that was looked at, by its number from 1, how much too high its frequency is: 0.02 of 2 per cent.
+
+    Of a converted body they are the modes under the reference conditions of its reduction.
+    """
     kept = provenance.get(MESH_ERROR, {"modes": [], "too_high": []})
     return dict(zip(kept["modes"], kept["too_high"], strict=True))
 
@@ -21,8 +33,17 @@ def mesh_doubt(provenance: Mapping[str, Any]) -> str | None:
     if first < TOLD:
         return None
     percent = f"{100 * first:.{0 if first >= 0.1 else 1}f}"
-    return (
-        f"its mesh is too coarse: the lowest frequency is about {percent} % too high; reduce it with smaller "
-        "elements or with those of second order (`ffr-prep reduce --size`, `--order 2`; a file that is a mesh already is "
-        "made finer by the program that wrote it)"
-    )
+    remedies = [remedy for key, remedy in _FINER.items() if _has(provenance, key)]
+    remedy = ", and ".join(remedies or _FINER.values())
+    before = ", under the reference conditions of its reduction," if CONVERTED_FROM in provenance else ""
+    return f"its mesh is too coarse: the lowest frequency{before} is about {percent} % too high; {remedy}"
+
+
+def made_of_plates(provenance: Mapping[str, Any]) -> bool:
+    """Whether plates are in the model, of whose bending the error is not known."""
+    return _has(provenance, "shells")
+
+
+def _has(record: Mapping[str, Any], key: str) -> bool:
+    """Whether a model, or a part of it, has the entry in its record."""
+    return bool(record.get(key)) or any(_has(part, key) for part in record.get("parts", {}).values())

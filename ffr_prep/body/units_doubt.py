@@ -8,6 +8,7 @@ import numpy as np
 
 from ffr_prep.body.constructors import MOVED_POINTS
 from ffr_prep.body.reduced import FlexibleBody, remembered
+from ffr_prep.common.arrays import Array
 
 _LONG = 100.0  # m
 _HEAVIEST = 2.3e4  # kg/m^3, of osmium
@@ -18,15 +19,21 @@ _LIGHTEST = (
 _FAR = 20.0  # diagonals of the body between it and a point that is attached to it
 _SPREAD = 100.0  # of the farthest point of a body without a shape, which its radius of gyration is not beyond
 _BALL = 9.02  # volume of a ball over the cube of its radius of gyration, 4 pi / 3 (5 / 3)^1.5: no solid has more
+_MOST_DAMPED = 0.2  # of critical damping, the least damped mode of a structure
 _THIN = 1e-2  # kg/m^3 over the cube of the radius of gyration, below which an inertia in kg mm^2 is, and no rotor
 
 
 def units_doubts(body: FlexibleBody) -> list[str]:
-    """What cannot be meant of a body, in words: its size, its mass for its size, points far away from it, its inertia.
+    """What cannot be meant of a body, in words: its size, its mass for its size, points far away from it, its inertia, its
+    damping.
 
     >>> fp.units_doubts(body)
     """
-    return [*remembered(body, "units doubts", lambda: (*_of_shape(body), *_of_points(body), *_of_places(body)))]
+    return [
+        *remembered(
+            body, "units doubts", lambda: (*_of_shape(body), *_of_points(body), *_of_places(body), *_of_damping(body))
+        )
+    ]
 
 
 def _of_shape(body: FlexibleBody) -> Iterator[str]:
@@ -86,6 +93,24 @@ def _of_places(body: FlexibleBody) -> Iterator[str]:
             f"its point {name!r} was asked for at {_place(asked)} m and is where the surface is nearest, at {_place(at)} m, "
             f"{away:.3g} m away: is that meant? Within a body, as on the axis of a beam, interfaces of its reduction can be"
         )
+
+
+def _of_damping(body: FlexibleBody) -> Iterator[str]:
+    if body.damping is not None and body.n:
+        ratios = body.damping.diagonal() / (2 * np.sqrt(np.maximum(body.omega2, np.finfo(float).tiny)))
+        yield from ratio_doubts(ratios)
+
+
+def ratio_doubts(ratios: Array) -> list[str]:
+    """What cannot be meant of the damping ratios (n,) of modes, in words."""
+    least = float(ratios.min(initial=np.inf))
+    if not _MOST_DAMPED <= least < np.inf:
+        return []
+    return [
+        f"its damping damps every mode by {least:.3g} of its critical damping or more"
+        f"{', so that none vibrates' * (least > 1)}: are ratios in per cent (1 % is 0.01)? Or is a matrix C in other units "
+        "than K and M, and is their order K, M, C?"
+    ]
 
 
 def _place(at: Iterable[float]) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -49,6 +49,7 @@ EXCHANGE_FORMATS: Registry[ExchangeFormat] = Registry(
             (".SID_FEM", ".sid"),
             f"{_ROOM}.sid:write_sid",
             f"{_ROOM}.sid:read_sid",
+            f"{_ROOM}.sid:left_out",
             settings=(
                 Setting(
                     "layout",
@@ -107,8 +108,16 @@ def export_body(body: FlexibleBody, path: Path, surface: bool, settings: Mapping
         raise InputError(f"{path}: {entry.name} can be read only; {_suffixes('write')} can be written")
     given = arguments(entry, settings)
     loaded(entry.write)(body, path, surface=surface, **given)
-    parts = ("the format has no parts: the body is written in one piece, for small deflections",) if body.parts else ()
-    return parts if entry.left_out is None else (*parts, *loaded(entry.left_out)(body, **given))
+    own = () if entry.left_out is None else loaded(entry.left_out)(body, **given)
+    return (*_without_place(body), *own)
+
+
+def _without_place(body: FlexibleBody) -> Iterator[str]:
+    """What no format holds, in words."""
+    if body.parts:
+        yield "the format has no parts: the body is written in one piece, for small deflections"
+    if body.surface is not None and (body.surface.stress is not None or body.surface.beams is not None):
+        yield "the format has no stress: that of the body, and section forces of beams, were left out"
 
 
 def import_body(path: Path, *, units: str = "m-kg-s") -> FlexibleBody:

@@ -82,6 +82,17 @@ def write_sid(body: FlexibleBody, path: str | Path, *, layout: Layout = "mode-ma
     return write_lines(Path(path), list(_lines(body, layout, nodes(body, surface=surface))))
 
 
+def left_out(body: FlexibleBody, *, layout: Layout = "mode-major") -> tuple[str, ...]:
+    """The losses of a file, in words; the layout makes none."""
+    if body.stiffening is None:
+        return ()
+    return (
+        "Oe.m1 holds the inertia of the shapes and the geometric stiffness of spin as one sum, as the format has it: a "
+        "program that wants the inertia alone, for how the deflection changes moments of inertia (I9), takes it from masses "
+        "at the nodes, as `ffr-prep import` does. A .fem file holds both",
+    )
+
+
 def blocks(body: FlexibleBody, layout: Layout) -> dict[str, tuple[Array, Array | None]]:
     """The Taylor blocks by name: m0 (rows, columns) and, of order 1, m1 (rows, n, columns)."""
     n = body.n

@@ -72,6 +72,12 @@ MATRIX_FORMATS: Registry[MatrixFormat] = Registry(
             "Nastran, KGG, MGG and, where it is there, BGG (pip install 'ffr[nastran]')",
         ),
         MatrixFormat(
+            "MATRICES.pch MODEL.bdf",
+            ((".pch",), (".bdf", ".dat", ".nas", ".fem")),
+            f"{_ROOM}.dmig:from_dmig",
+            "Nastran and OptiStruct, punched as DMIG: KAAX, MAAX and, where it is there, BAAX",
+        ),
+        MatrixFormat(
             "MODEL.op2",
             ((".op2",),),
             f"{_ROOM}.nastran:from_op2",

@@ -89,7 +89,7 @@ def from_matrices(
             "warnings": precision_warnings(model),
         },
         packages=("ffr", "numpy", "scipy"),
-        doubts=lambda basis: [*_overdamped(model, ties @ basis), *_doubts(model, m, ties @ basis)],
+        doubts=lambda basis: _doubts(model, m, ties @ basis),
         damping=lambda basis: _damping(model, ties @ basis),
         massless=mass_is_singular(model),
         unstressed=True,
@@ -119,19 +119,6 @@ def _damping_notes(model: MatrixModel) -> list[str]:
     rigid = rigid_motions(model.points, model.dofs)
     of_rigid, of_all = abs(model.C @ rigid).max(), abs(model.C).max() * abs(rigid).max()
     return ["C damps rigid motions too; of a body what deforms it is damped"] if of_rigid > 1e-9 * of_all else []
-
-
-def _overdamped(model: MatrixModel, Phi: Array) -> list[str]:
-    """Of the modes Phi (D, n) of unit mass: a note where C leaves none that vibrates."""
-    if model.C is None or not Phi.size:
-        return []
-    stiffness, damping = (np.einsum("dn,dn->n", Phi, A @ Phi) for A in (model.K, model.C))
-    ratio = float((damping / (2 * np.sqrt(np.maximum(stiffness, np.finfo(float).tiny)))).min())
-    return [
-        f"C damps every mode by {ratio:.3g} of its critical damping or more, so that none vibrates: is C in the units of the "
-        "other matrices, and is their order K, M, C?"
-        for _ in range(ratio > 1)
-    ]
 
 
 def _doubts(model: MatrixModel, m: sp.csr_array | None, Phi: Array) -> list[str]:

@@ -44,6 +44,7 @@ class _Deck:
     faces: list[tuple[int, list[int]]] = field(default_factory=list)
     sets: dict[int, list[int]] = field(default_factory=dict)
     system: int = 0
+    displacements: int = 0  # the system of these where a GRID names none
     found: Counter[str] = field(default_factory=Counter)
 
 
@@ -71,6 +72,38 @@ def from_nastran(path: Path) -> FileMesh:
         raise InputError(text if text.startswith(str(path)) else f"{path}: {text}") from None
 
 
+@dataclass(frozen=True)
+class Grids:
+    """The grid points of bulk data: labels (N,) numbers, points (N, 3) in basic coordinates, systems (N,) of their
+    displacements (CD), groups: name -> numbers of grid points."""
+
+    labels: Array
+    points: Array
+    systems: Array
+    groups: Mapping[str, Array]
+
+
+def grids_of_nastran(path: Path) -> Grids:
+    """The grid points of bulk data, with SET1 as groups set_N, whatever elements there are.
+
+    Raises InputError for a file that cannot be read or has none, and for points in systems that it does not define.
+    """
+    deck = _Deck()
+    try:
+        for card in cards(path):
+            if card.name in ("GRID", "GRDSET", "SET1", *_SYSTEMS):
+                _take(deck, card)
+        if not deck.grids:
+            raise InputError("it has no GRID: is it Nastran bulk data?")
+        points = _points(deck)
+        systems = [card.integer(6, deck.displacements) for card in deck.grids.values()]
+    except InputError as error:
+        text = str(error)
+        raise InputError(text if text.startswith(str(path)) else f"{path}: {text}") from None
+    groups = {f"set_{number}": np.array(of, np.int64) for number, of in deck.sets.items() if of}
+    return Grids(np.array(list(deck.grids), np.int64), points, np.array(systems, np.int64), groups)
+
+
 def _kind(card: Card) -> str:
     """The name of a card, or the word in it that says what it changes."""
     if card.name == "MAT1" and card.text(8):
@@ -91,7 +124,7 @@ def _take(deck: _Deck, card: Card) -> None:
         if deck.systems.setdefault(card.integer(1), card).fields != card.fields:
             raise InputError(f"{card} is defined twice")
     elif card.name == "GRDSET":
-        deck.system = card.integer(2, 0)
+        deck.system, deck.displacements = card.integer(2, 0), card.integer(6, 0)
     elif card.name == "SET1":
         deck.sets[card.integer(1)] = _members(card)
 

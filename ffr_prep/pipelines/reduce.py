@@ -34,8 +34,9 @@ from ffr_prep.model.model import Model
 from ffr_prep.model.reactions import in_equilibrium, known_loads
 from ffr_prep.model.reference import ReferenceConditions, at_interfaces, conditions_of_part, functionals
 from ffr_prep.reduction.basis import Basis, Reduction, check_basis, factorised
-from ffr_prep.reduction.held_body import held_body, needs_held_body
+from ffr_prep.reduction.held_body import held_body, needs_held_body, unshown_loads
 from ffr_prep.reduction.mesh_error import mesh_error
+from ffr_prep.reduction.mesh_resolution import sheet_doubt
 from ffr_prep.reduction.quality import assess, completed
 from ffr_prep.reduction.second_order import check_size, with_second_order
 from ffr_prep.reduction.selection import Band
@@ -135,7 +136,7 @@ def reduce(
     try:
         whole = _reduced(model, request, progress, advance)
         whole = _with_cut_error(replace(whole, parts=tuple(_parts(parts, request, progress, advance))))
-        return with_damping(whole, request.damping)
+        return _with_doubts(with_damping(whole, request.damping))
     except ComputationError:
         model.diagnose()
         _check_points(model.coupled)
@@ -222,8 +223,7 @@ def _reduced(model: Model, request: Request, progress: Stages, advance: Advance)
             progress("compute the second order of the surface")
             drawn = replace(basis, Z=basis.Z[:, : request.drawn_modes], omega2=basis.omega2[: request.drawn_modes])
             surface = with_second_order(surface, model, held, request.reference, drawn, advance)
-    found = [mesh_doubt(of_mesh), steady_stress_doubt(of_stress), shear_doubt(model.record) if request.stress else None]
-    doubts = [*model.doubts(basis.Z), *filter(None, found)]
+    doubts = _doubts(model, basis, of_mesh, of_stress, stress=request.stress)
     made = FlexibleBody(
         name=request.name,
         omega2=basis.omega2,
@@ -234,11 +234,26 @@ def _reduced(model: Model, request: Request, progress: Stages, advance: Advance)
         damping=model.damping(basis.Z),
         **vars(integrals),
     )
-    warnings = [*made.provenance["warnings"], *units_doubts(made)]
-    if not made.n:
-        warnings.append(_UNDEFORMED)
-    made = replace(made, provenance={**made.provenance, "warnings": list(dict.fromkeys(warnings))})
-    return _with_held_body(made, model, body, progress)
+    return _with_held_body(_with_doubts(made), model, body, progress)
+
+
+def _with_doubts(made: FlexibleBody) -> FlexibleBody:
+    """The body with warnings of what cannot be meant of its numbers, each once."""
+    warnings = [*made.provenance["warnings"], *units_doubts(made), *([] if made.n else [_UNDEFORMED])]
+    return replace(made, provenance={**made.provenance, "warnings": list(dict.fromkeys(warnings))})
+
+
+def _doubts(
+    model: Model, basis: Basis, of_mesh: Mapping[str, Any], of_stress: Mapping[str, Any], *, stress: bool
+) -> list[str]:
+    """What model, mesh and shapes cannot be trusted with, in words."""
+    found = [
+        mesh_doubt({**model.record, **of_mesh}),
+        sheet_doubt(model.record, model.coupled, basis.Z),
+        steady_stress_doubt(of_stress),
+        shear_doubt(model.record) if stress else None,
+    ]
+    return [*model.doubts(basis.Z), *filter(None, found)]
 
 
 def _with_held_body(made: FlexibleBody, model: Model, body: FreeBody, progress: Stages) -> FlexibleBody:
@@ -246,7 +261,11 @@ def _with_held_body(made: FlexibleBody, model: Model, body: FreeBody, progress: 
     if model.massless or not needs_held_body(made):
         return made
     progress("look at the interfaces held")
-    return replace(made, provenance={**made.provenance, "held_body": held_body(model.coupled, body, model.inertia)})
+    held = held_body(model.coupled, body, model.inertia)
+    stressed = made.surface is not None and (made.surface.stress is not None or made.surface.beams is not None)
+    unshown = unshown_loads(made, held) if stressed else None
+    warnings = [*made.provenance["warnings"], *filter(None, [unshown])]
+    return replace(made, provenance={**made.provenance, "held_body": held, "warnings": warnings})
 
 
 # ---- basis --------------------------------------------------------------------------------------------------------

@@ -26,7 +26,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from ffr_prep.body import FlexibleBody
+from ffr_prep.body import CONVERTED_FROM, FlexibleBody, mesh_doubt
 from ffr_prep.body.frame_change import in_motions, interface_motions, mass_of_motions
 from ffr_prep.body.interface_freedom import interface_freedom
 from ffr_prep.body.provenance import described
@@ -101,12 +101,10 @@ def motion_model(body: FlexibleBody) -> CoupledModel:
 def _provenance(body: FlexibleBody, conditions: ReferenceConditions) -> dict[str, Any]:
     kept = {key: value for key, value in body.provenance.items() if key not in ("quality", "command")}
     before = body.provenance.get("reference", {})
-    warnings = [*body.provenance.get("warnings", []), *_losses(body, before)]
-    return kept | {
-        "reference": described(conditions),
-        "converted_from": before,
-        "warnings": list(dict.fromkeys(warnings)),
-    }
+    found = kept | {"reference": described(conditions), CONVERTED_FROM: before}
+    of_mesh = mesh_doubt(body.provenance)
+    said = [mesh_doubt(found) if one == of_mesh else one for one in body.provenance.get("warnings", [])]
+    return found | {"warnings": list(dict.fromkeys([*said, *_losses(body, before)]))}
 
 
 def _condition_count(reference: Mapping[str, Any]) -> int:

@@ -9,6 +9,9 @@ Source: K. J. Bathe, Finite Element Procedures (1996), section 9.4 (elements for
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 import scipy.sparse as sp
 
@@ -48,6 +51,23 @@ def elements_per_wavelength(model: CoupledModel, Z: Array) -> Array:
     # of the edges of an element, one in `dimension` lies along the wave
     phase = np.sqrt(model.dimension * change / np.where(size > 0, size, np.inf))
     return 2 * np.pi / np.maximum(phase, np.finfo(float).tiny)
+
+
+def sheet_doubt(record: Mapping[str, Any], model: CoupledModel, Z: Array) -> str | None:
+    """Says so when the lowest mode of a frame of plates alone, the first shape Z (Z, n), is too short for its elements.
+
+    Their bending has no other estimate of its error (`ffr_prep.structures.plate_mesh_error`). Beams need no elements for
+    statics, and would seem too coarse.
+    """
+    if not record.get("shells") or record.get("members") or not Z.shape[1]:
+        return None
+    found = elements_per_wavelength(model, Z[:, :1])[0]
+    if found >= ENOUGH:
+        return None
+    return (
+        f"its plates are meshed too coarsely: the lowest mode has {found:.1f} elements per wavelength, fewer than "
+        f"{ENOUGH:g}, and may be off by some 5 %, too low or too high; give its sheets more elements"
+    )
 
 
 def _derivatives(points: Array, edges: Array) -> list[sp.csr_array]:

@@ -8,7 +8,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ffr_prep.body import CUT_ERROR, MESH_ERROR, STEADY_STRESS, FlexibleBody, cut_errors_of, mesh_errors_of
+from ffr_prep.body import (
+    CONVERTED_FROM,
+    CUT_ERROR,
+    MESH_ERROR,
+    STEADY_STRESS,
+    FlexibleBody,
+    cut_errors_of,
+    made_of_plates,
+    mesh_errors_of,
+)
 from ffr_prep.body.interface_freedom import interface_freedom
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.in_words import settings_in_words, vector_in_words
@@ -161,7 +170,9 @@ def mesh_error_lines(provenance: Mapping[str, Any]) -> Iterator[str]:
     """How much too high the frequencies are by the size of the elements, as far as that is known."""
     if errors := mesh_errors_of(provenance):
         each = ", ".join(f"{_percent(error)} ({mode})" for mode, error in errors.items())
-        yield f"mesh error  frequencies too high by about {each}; in brackets the mode"
+        alone = "; of plates without their bending" if made_of_plates(provenance) else ""
+        before = " under the reference conditions of its reduction" if CONVERTED_FROM in provenance else ""
+        yield f"mesh error  frequencies too high by about {each}; in brackets the mode{before}{alone}"
 
 
 def damping_lines(body: FlexibleBody) -> Iterator[str]:

@@ -23,9 +23,14 @@ from ffr_prep.structures.beam_stiffening import beam_forces_of_products, beam_st
 from ffr_prep.structures.beam_stress import SECTION_STRESS, section_forces, stressed_sweep
 from ffr_prep.structures.beam_surface import moved_linearly, swept_surface
 from ffr_prep.structures.frame import Frame, ends, orientations
-from ffr_prep.structures.plate_second_order import second_faces, second_stressed_faces
 from ffr_prep.structures.plate_stiffening import plate_forces_of_products, plate_stiffening
-from ffr_prep.structures.plate_surface import FACE_STRESS, plate_faces, stressed_faces
+from ffr_prep.structures.plate_surface import (
+    FACE_STRESS,
+    plate_faces,
+    second_faces,
+    second_stressed_faces,
+    stressed_faces,
+)
 
 
 @dataclass(frozen=True)

@@ -175,6 +175,11 @@ def _free_nodes(frame: Frame, interfaces: Sequence[InterfaceRegion]) -> Array:
     return np.setdiff1d(np.arange(len(frame.points)), np.concatenate([np.zeros(0, np.int64), *taken]))
 
 
+def loaded_nodes(frame: Frame, interfaces: Sequence[InterfaceRegion]) -> Array:
+    """The nodes on which interfaces and beams act."""
+    return np.unique(np.concatenate([frame.elements.ravel(), *(_nodes(frame, i) for i in interfaces)]))
+
+
 def _interface_points(frame: Frame, interfaces: Sequence[InterfaceRegion]) -> Array:
     """(I, 3) the given point, or the mean of the nodes [m]."""
     given = [frame.points[_nodes(frame, i)].mean(axis=0) if i.point is None else i.point for i in interfaces]

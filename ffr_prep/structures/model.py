@@ -37,7 +37,8 @@ from ffr_prep.solvers.threads import on_one_thread
 from ffr_prep.structures.cutting import cut_frame
 from ffr_prep.structures.element_families import Family, connectivity, element_values, families
 from ffr_prep.structures.frame import Frame, check_frame, frame_hash, joint_doubts, overlap_doubts, thickness_doubts
-from ffr_prep.structures.interfaces import couple_frame, tie, turning_regions
+from ffr_prep.structures.interfaces import couple_frame, loaded_nodes, tie, turning_regions
+from ffr_prep.structures.plate_mesh_error import added_energy
 from ffr_prep.structures.second_order import frame_second_order
 
 _CHUNK = 512
@@ -115,6 +116,7 @@ def from_frame(frame: Frame, interfaces: Sequence[InterfaceRegion] = (), *, prog
         second=second,
         recovery="; ".join(dict.fromkeys(part.recovery for part in parts)),
         record=_record(frame, interfaces, coupled, parts),
+        mesh_energy=lambda basis: added_energy(frame, loaded_nodes(frame, interfaces), ties @ basis),
         cut=lambda cuts: [partial(from_frame, *part) for part in cut_frame(frame, interfaces, cuts)],
     )
 

@@ -20,6 +20,8 @@ _CORNER = {3: skfem.ElementTriP1, 4: skfem.ElementQuad1}
 _SIDE = {3: skfem.ElementTriP2, 4: skfem.ElementQuadS2}
 _CENTRE = {3: (skfem.ElementTriMini, 3), 4: (skfem.ElementQuad2, 8)}
 
+CORNERS = {3: np.array([(0, 0), (1, 0), (0, 1)], float), 4: np.array([(0, 0), (1, 0), (1, 1), (0, 1)], float)}
+
 
 @dataclass(frozen=True)
 class Reference:

@@ -2,6 +2,10 @@
 
 The stress of a face is that of the membrane strain and of the curvature at the height of half the thickness, without
 stress across the plate. The elements' own values in a corner are averaged over the elements that share the point.
+
+To second order the middle plane moves by the second-order coordinates of the nodes; a fibre of the height z turns by phi,
+which adds phi x (phi x z e_z) / 2. The strain of products of gradients in the plane is that of
+`ffr_prep.structures.plate_stiffening`.
 """
 
 from __future__ import annotations
@@ -13,6 +17,7 @@ import numpy as np
 from ffr_prep.body import TENSOR, Surface
 from ffr_prep.body.accelerations import turned
 from ffr_prep.common.arrays import Array
+from ffr_prep.structures.plate_functions import CORNERS
 from ffr_prep.structures.plate_stiffening import strain_of_products
 from ffr_prep.structures.plates import (
     Plates,
@@ -24,7 +29,6 @@ from ffr_prep.structures.plates import (
     undeformed,
 )
 
-_CORNERS = {3: np.array([(0, 0), (1, 0), (0, 1)], float), 4: np.array([(0, 0), (1, 0), (1, 1), (0, 1)], float)}
 _FACE = {3: np.array([(0, 1, 2)]), 4: np.array([(0, 1, 2), (0, 2, 3)])}
 _DIGITS = 9
 _ROWS, _COLUMNS = np.array(TENSOR).T
@@ -39,7 +43,7 @@ def plate_faces(elements: Plates, nodes: Array, nodal: Array) -> Surface:
     continue one another in the same plane share points.
     """
     count, k = nodes.shape
-    at = np.tile(_CORNERS[k], (2, 1))
+    at = np.tile(CORNERS[k], (2, 1))
     half = _heights(elements)
     points = undeformed(elements, at, half).reshape(-1, 3)
     shapes = (field(elements, at, half) @ nodal[:, None]).reshape(len(points), 3, nodal.shape[2])
@@ -53,7 +57,7 @@ def turned_faces(elements: Plates, nodes: Array, one: Array, others: Array) -> A
 
     one (E, 6k, 1) and others (E, 6k, m): coordinates in body axes
     """
-    at, half = np.tile(_CORNERS[nodes.shape[1]], (2, 1)), _heights(elements)
+    at, half = np.tile(CORNERS[nodes.shape[1]], (2, 1)), _heights(elements)
     turn = fibre_rotation(elements, at) @ element_coordinates(elements)[:, None]
     of_fibre = turned((turn @ one[:, None])[..., 0], turn @ others[:, None])[:, :, :, 2] * half[..., None, None]
     in_body_axes = np.einsum("eck,eqkr->eqcr", elements.C, of_fibre)
@@ -77,9 +81,24 @@ def stressed_faces(
     return replace(plate_faces(elements, nodes, nodal), stress=mean, moduli=moduli[kept])
 
 
+def second_faces(elements: Plates, nodes: Array, nodal: Array, one: Array, others: Array) -> Surface:
+    """The faces with the displacements of pairs, of one (E, 6k, 1) and others (E, 6k, m).
+
+    nodal : (E, 6k, m) second-order coordinates of the pairs; all in body axes
+    """
+    faces = plate_faces(elements, nodes, nodal)
+    return replace(faces, Phi=faces.Phi + turned_faces(elements, nodes, one, others))
+
+
+def second_stressed_faces(elements: Plates, nodes: Array, nodal: Array, one: Array, others: Array) -> Surface:
+    """As `second_faces`, with the stress of the pairs."""
+    faces = stressed_faces(elements, nodes, nodal, (one, others))
+    return replace(faces, Phi=faces.Phi + turned_faces(elements, nodes, one, others))
+
+
 def _corner_stress(elements: Plates, nodal: Array, products: tuple[Array, Array] | None) -> Array:
     """(E, 2k, 6, n) stress in body axes at the corners of the upper and then of the lower face."""
-    at, to_element = _CORNERS[nodal.shape[1] // 6], element_coordinates(elements)
+    at, to_element = CORNERS[nodal.shape[1] // 6], element_coordinates(elements)
     e = (to_element @ nodal)[:, None]
     half = elements.thickness[:, None, None, None] / 2
     membrane = membrane_strain(elements, at) @ e

@@ -48,7 +48,7 @@ from ffr_prep.structures.plate_functions import Reference, reference, rule
 
 # Exact for products of two fields, and of two strains, of triangles and parallelograms.
 _MASS_ORDER = {3: 8, 4: 7}
-_STIFFNESS_ORDER = {3: 6, 4: 7}
+STIFFNESS_ORDER = {3: 6, 4: 7}
 
 _FOLLOWING = 0.1
 _FLAT = 0.01
@@ -396,7 +396,7 @@ def mass_points(elements: Plates) -> tuple[Array, Array, Array]:
 def stiffness(elements: Plates) -> Array:
     """(E, 6k, 6k) stiffness of the nodal coordinates in body axes: membrane and bending."""
     k = elements.lift.shape[1]
-    at, weights = rule(k, _STIFFNESS_ORDER[k])
+    at, weights = rule(k, STIFFNESS_ORDER[k])
     area = jacobian(elements, reference(k, at))[1] * weights
     K = _energy(membrane_strain(elements, at), elements.membrane, area)
     K += _energy(bending_strain(elements, at), elements.bending, area)

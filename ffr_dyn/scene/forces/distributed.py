@@ -26,6 +26,7 @@ from ffr_prep.common.errors import InputError
 
 _SAME_PLACE = 1e-9  # of the size of the body
 _MOST_ARROWS = 16  # of a load
+_FOLLOWED = 0.25  # of a load, by the shapes of a body; where they have nine tenths, stress is right to some per cent
 
 
 @dataclass(frozen=True)
@@ -151,6 +152,43 @@ def unstiffened(force: Any, scene: Scene) -> tuple[str, ...]:
         f"force {force.name!r} stiffens or buckles {of} of {force.body!r}: the surface has a second-order displacement of no "
         "more; reduce the body without drawn_modes, or give the load at an interface",
     )
+
+
+def unfollowed(force: Any, scene: Scene, points: Array, f: Array) -> tuple[str, ...]:
+    """A note where a body with stress hardly has motions that are like the load, of forces f (N, 3) on points (N,), as of a
+    pressure within a tube, which widens in its fastest modes alone."""
+    body = force.place.of(scene).model
+    surface = surface_of(body, force.name)
+    if surface.stress is None or not body.n:
+        return ()
+    share = _followed(surface, points, f)
+    if share >= _FOLLOWED:
+        return ()
+    return (
+        f"force {force.name!r}: the shapes of {force.body!r} hardly move as it pushes (they follow {100 * share:.2g} % of it "
+        "where it acts), so that the stress and the deformation that it causes there are missing; reduce the body with "
+        "shapes that do: UserVectors of the deflection under it, or InertiaRelief(), which has walls that widen",
+    )
+
+
+def _followed(surface: Surface, points: Array, f: Array) -> float:
+    """How much of the load per area, in the mean square over the points, the shapes and the rigid motions can follow."""
+    loaded, of = np.unique(points, return_inverse=True)
+    total = np.zeros((len(loaded), 3))
+    np.add.at(total, of.ravel(), f)
+    a, b, c = np.moveaxis(surface.points[surface.triangles], 1, 0)
+    area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    weight = np.sqrt(np.bincount(surface.triangles.ravel(), np.repeat(area, 3), len(surface.points))[loaded])
+    weight = np.where(weight > 0, weight, 1.0)
+    at = surface.points[loaded] - surface.points[loaded].mean(axis=0)
+    turning = np.cross(np.eye(3), at[:, None]).swapaxes(1, 2) / max(np.abs(at).max(), np.finfo(float).tiny)
+    motions = np.concatenate([np.broadcast_to(np.eye(3), turning.shape), turning, surface.Phi[loaded]], axis=2)
+    columns = (motions * weight[:, None, None]).reshape(3 * len(loaded), -1)
+    columns /= np.maximum(np.linalg.norm(columns, axis=0), np.finfo(float).tiny)
+    pushed = (total / weight[:, None]).ravel()
+    work = columns.T @ pushed
+    amounts = np.linalg.lstsq(columns.T @ columns, work, rcond=_SAME_PLACE)[0]
+    return float(work @ amounts / (pushed @ pushed)) if pushed.any() else 1.0
 
 
 def measured_factor(force: Any) -> tuple[Measured, ...]:

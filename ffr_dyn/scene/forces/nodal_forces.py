@@ -26,6 +26,7 @@ from ffr_dyn.scene.forces.distributed import (
     numbers_at,
     second_order,
     surface_of,
+    unfollowed,
     unstiffened,
 )
 from ffr_dyn.scene.forces.force import Force
@@ -79,7 +80,8 @@ class NodalForces(Force):
         return OnBody(f"force {self.name!r}", self.body, self.axes, measured_factor(self))
 
     def doubts(self, scene: Scene) -> tuple[str, ...]:
-        return unstiffened(self, scene)
+        turned = unfollowed(self, scene, self.points, self.forces) if self.axes == "body" else ()
+        return (*unstiffened(self, scene), *turned)
 
     def drawn(self, scene: Scene) -> dict[str, Any]:
         """Forces at few of the points, each with those of the points that are nearest to it (`arrows_on_surface`)."""

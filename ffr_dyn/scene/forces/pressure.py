@@ -25,6 +25,7 @@ from ffr_dyn.scene.forces.distributed import (
     numbers_at,
     second_order,
     surface_of,
+    unfollowed,
     unstiffened,
 )
 from ffr_dyn.scene.forces.force import Force
@@ -83,8 +84,9 @@ class Pressure(Force):
         return OnBody(f"force {self.name!r}", self.body, measured=measured_factor(self))
 
     def doubts(self, scene: Scene) -> tuple[str, ...]:
-        if not self._cancels(self.place.of(scene).model):
-            return unstiffened(self, scene)
+        body = self.place.of(scene).model
+        if not self._cancels(body):
+            return (*unstiffened(self, scene), *unfollowed(self, scene, *self._nodal(body)))
         return (
             f"force {self.name!r} does next to nothing: over all of the surface that it acts on it cancels, as on both faces "
             f"of a plate, and the modes of {self.body!r} show none of it; give the triangles of the side that it acts on",
@@ -140,14 +142,11 @@ class Pressure(Force):
         Raises InputError when the body has no surface, or not the triangles.
         """
         surface = surface_of(body, self.name)
-        corners = surface.triangles[self._chosen(body, surface)]
+        corners, share, area = self._loaded(body, surface)
         u, Phi = surface.points[corners], surface.Phi[corners]  # (T, 3, 3), (T, 3, 3, n)
         edge, other = u[:, 1] - u[:, 0], u[:, 2] - u[:, 0]
         edge_q, other_q = Phi[:, 1] - Phi[:, 0], Phi[:, 2] - Phi[:, 0]
-        area = np.cross(edge, other) / 2  # (T, 3) area times outward normal
         area_q = (np.cross(edge_q, other[:, :, None], axis=1) + np.cross(edge[:, :, None], other_q, axis=1)) / 2
-        p = self._at_points(body, surface)[corners]
-        share = -(p + p.sum(1, keepdims=True)) / 12  # (T, 3)
         f = share[:, :, None] * area[:, None]
         slope = share[:, :, None, None] * area_q[:, None] * (1.0 if self.follower else 0.0)
         count, n = 3 * len(corners), body.n
@@ -157,6 +156,18 @@ class Pressure(Force):
             # Area and normal are of first order: so is the moment. The symmetric part has the work, and no moment.
             second = 0.5 * (second + second.swapaxes(0, 1))
         return replace(made, second=second)
+
+    def _loaded(self, body: FlexibleBody, surface: Surface) -> tuple[Array, Array, Array]:
+        """(T, 3) corners of the loaded triangles, the pressure that each takes, and (T, 3) area times outward normal."""
+        corners = surface.triangles[self._chosen(body, surface)]
+        a, b, c = np.moveaxis(surface.points[corners], 1, 0)
+        p = self._at_points(body, surface)[corners]
+        return corners, -(p + p.sum(1, keepdims=True)) / 12, np.cross(b - a, c - a) / 2
+
+    def _nodal(self, body: FlexibleBody) -> tuple[Array, Array]:
+        """(3T,) points and (3T, 3) the forces at them."""
+        corners, share, area = self._loaded(body, surface_of(body, self.name))
+        return corners.ravel(), (share[:, :, None] * area[:, None]).reshape(-1, 3)
 
     def _at_points(self, body: FlexibleBody, surface: Surface) -> Array:
         size = len(surface.points)

@@ -126,3 +126,29 @@ def test_a_point_on_the_axis_of_a_beam_is_told(section):
     assert fp.units_doubts(fp.with_point(rod, "p", rod.surface.points[30])) == []
     for x in (0.9, 1.0, 2.0):
         assert f"'p' was asked for at ({x:g}, 0, 0) m" in fp.units_doubts(fp.with_point(rod, "p", (x, 0.0, 0.0)))[0]
+
+
+@pytest.mark.parametrize(
+    ("damping", "told"),
+    [
+        (fp.Damping(ratios=[2.0]), ", so that none vibrates"),  # of 2 per cent
+        (fp.Damping(ratios=[0.5]), "of its critical damping or more: are ratios in per cent"),
+        (fp.Damping(loss_factor=2.0), "its damping damps every mode by 1 of its critical damping"),
+        (fp.Damping(ratios=[0.05, 2.0]), None),
+        (fp.Damping(alpha=2.0, beta=1e-6), None),
+    ],
+)
+def test_damping_in_per_cent_is_told(damping, told):
+    request = fp.Request(name="bar", reference=fp.FixedTo("left"), reduction=fp.Eigenmodes(3), damping=damping)
+    model = fp.from_mesh(box_mesh("hex8", (0.3, 0.02, 0.02), (6, 1, 1)), STEEL, [fp.InterfaceRegion("left")])
+    said = [warning for warning in fp.reduce(model, request).provenance["warnings"] if "critical damping" in warning]
+    assert [told in one for one in said] == ([] if told is None else [True])
+
+
+@pytest.mark.parametrize(("ratio", "told"), [(1.0, True), (0.01, False)])
+def test_a_scene_tells_of_damping_in_per_cent(ratio, told):
+    bar = body()
+    clamp = fd.Joint("clamp", "fixed", "ground.wall", "bar.left")
+    scene = fd.Scene([fd.Body("bar", bar, damping=ratio)], [clamp], ground={"wall": bar.interfaces[0].position})
+    notes = fd.assembly(scene).attributes["notes"]
+    assert any("body 'bar': its damping damps every mode by 1 of" in note for note in notes) is told

@@ -125,7 +125,39 @@ def calculix(**changes: str) -> object:
     return with_files(lambda: fp.read_matrices(list(files)), {name: (("", text),) for name, text in files.items()})
 
 
+PUNCHED = """DMIG,KAAX,0,6,2,0,,,12
+DMIG,KAAX,1,1,,1,1,2.+6
+,2,1,-2.+6
+DMIG,KAAX,2,1,,2,1,2.+6
+DMIG,MAAX,0,6,2,0,,,12
+DMIG,MAAX,1,1,,1,1,3.0
+DMIG,MAAX,2,1,,2,1,5.0
+"""
+GRIDS = "GRID,1,,0.,0.,0.\nGRID,2,,1.,0.,0.\n"
+
+
+def dmig(old: str = "", new: str = "", grids: str = GRIDS) -> object:
+    files = {"a.pch": PUNCHED.replace(old, new) if old else PUNCHED, "a.bdf": grids}
+    return with_files(lambda: fp.read_matrices(list(files)), {name: (("", text),) for name, text in files.items()})
+
+
+DMIG = [
+    *(
+        Case(p(dmig, old, new), dmig)
+        for old, new in (
+            ("MAAX", "MGG"),
+            ("DMIG,KAAX,0,6,2", "DMIG,KAAX,0,6,3"),
+            ("DMIG,KAAX,0,6", "DMIG,KAAX,0,2"),
+            ("DMIG,MAAX,0,6,2,0,,,12\n", ""),
+            ("DMIG,MAAX,0,", "DMIG,KAAX,0,6,2,0\nDMIG,MAAX,0,"),
+            ("DMIG,MAAX,1,1,,1,1", "DMIG,MAAX,1,0,,1,1"),
+        )
+    ),
+    Case(p(dmig, grids="CORD2R,7,,0.,0.,0.,0.,0.,1.\n,1.,0.,0.\n" + GRIDS.replace("0.\nG", "0.,7\nG")), dmig),
+    Case(p(dmig, grids="PARAM,POST,-1\n"), dmig),
+]
 FILES = [
+    *DMIG,
     of(MARKET, "rows.csv", ("\n1,2,0.0", "\n1,2,0.5")),
     of(MARKET, "rows.csv", ("\n1,2,0.0", "\n1,2,left")),
     of(MARKET, "K.mtx", ("real", "complex")),

@@ -118,7 +118,9 @@ def test_a_soft_half_does_not_hide_in_the_stress_of_a_stiff_one():
 def test_a_body_tells_it_and_a_coarse_one_warns():
     coarse, fine = reduced(box_mesh("hex8", ROD, COARSE)), reduced(box_mesh("hex27", ROD, FINE))
     assert "% too high" in mesh_doubt(coarse.provenance)
-    assert any("its mesh is too coarse" in warning for warning in coarse.provenance["warnings"])
+    assert "--order 2" in mesh_doubt(coarse.provenance)
+    assert "triangles" not in mesh_doubt(coarse.provenance)
+    assert mesh_doubt(coarse.provenance) in coarse.provenance["warnings"]
     assert mesh_doubt(fine.provenance) is None
     assert not fine.provenance["warnings"]
     for body in (coarse, fine):
@@ -142,3 +144,18 @@ def test_beams_and_matrices_know_nothing_of_elements():
     body = fp.reduce(fp.from_frame(straight(rectangle(0.01, 0.02), 1.0, 4)), request)
     assert mesh_errors_of(body.provenance) == {}
     assert not any(line.startswith("mesh error") for line in body_lines(body))
+
+
+def test_a_converted_body_says_of_which_modes_it_tells():
+    """In its mean-axis frame the modes are others: of a free rod the first is as wrong as the third of a clamped one."""
+    body = reduced(box_mesh("hex8", ROD, COARSE), 6)
+    free = fp.with_reference(body, fp.MeanAxis())
+    kept = fp.truncated(free, 3)
+    for converted in (free, kept):
+        assert converted.frequencies[0] > 2 * body.frequencies[0]
+        assert mesh_errors_of(converted.provenance) == mesh_errors_of(body.provenance)
+        (line,) = [line for line in body_lines(converted) if line.startswith("mesh error")]
+        assert line.endswith("in brackets the mode under the reference conditions of its reduction")
+        (warning,) = [one for one in converted.provenance["warnings"] if "its mesh is too coarse" in one]
+        assert warning == mesh_doubt(converted.provenance)
+        assert "the lowest frequency, under the reference conditions of its reduction, is about" in warning
