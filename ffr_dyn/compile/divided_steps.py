@@ -156,7 +156,7 @@ def _refuse_poles(system: System, made: Made, found: Changes, span: tuple[float,
     start, end, step = span
     narrow = found.spans[found.spans[:, 1] - found.spans[:, 0] < SHARP * step]
     breaks = system.model.functions.breaks[:, [UNTIL, SINCE]]
-    times = np.concatenate([0.5 * ends.sum(axis=1) for ends in (narrow, found.jumps, breaks)])
+    times = np.concatenate([[start, end], *(0.5 * ends.sum(axis=1) for ends in (narrow, found.jumps, breaks))])
     sample = partial(_sampled, system, partial(_no_python, system))
     at = pole(sample, made.roots, times[(times >= start) & (times <= end)], step)
     if at:
