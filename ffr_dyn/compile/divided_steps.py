@@ -110,7 +110,7 @@ def breaks_of(system: System, start: float, end: float, output_step: float) -> A
 
 def _refuse_wrong_rates(system: System, rows: Array) -> None:
     for callback in system.user.callbacks:
-        if not callback.with_state and (wrong := wrong_rate(partial(of_time, callback), rows, min(callback.sizes) - 1)):
+        if not callback.with_state and (wrong := wrong_rate(partial(of_time, callback), rows)):
             raise ComputationError(misled(callback.what, *wrong))
 
 
