@@ -215,14 +215,15 @@ class UserFunctions:
         out = _at(out_address, self.count)
         for callback in self.callbacks:
             try:
-                out[callback.slot : callback.slot + callback.size] = self._values(callback, t, x, v)
+                out[callback.slot : callback.slot + callback.size] = self.values(callback, t, x, v)
             except BaseException as error:
                 self.failure = f"{callback.what} at t = {t:.6g} s: {error or type(error).__name__}"
                 self.cause = error
                 return 1
         return 0
 
-    def _values(self, callback: Callback, t: float, x: Array, v: Array) -> Array:
+    def values(self, callback: Callback, t: float, x: Array, v: Array) -> Array:
+        """(callback.size,) what a function returns, zero for what it does not. Raises what it raises."""
         arguments = (t, StateView(self.scene, self.place, x, v)) if callback.with_state else (t,)
         given, values = _checked(callback, callback.function(*arguments)), np.zeros(callback.size)
         values[: given.size] = given
