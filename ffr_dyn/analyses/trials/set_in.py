@@ -17,9 +17,7 @@ from ffr_prep.common.arrays import Array
 
 LOOKS = 400  # rows at most at which functions are evaluated
 EARLY = 1e-13, 1e-3  # of what an output comes to: the sizes from which to which it is looked at
-FOLLOWS = (
-    0.3  # of the decades that an output grows through there, those by which its size over the function's may change
-)
+FOLLOWS = 0.3  # of the decades that an output grows through there: by which its size over the function's may change
 MOST = 10, 90  # percent of rows, between which the others may tremble
 
 
