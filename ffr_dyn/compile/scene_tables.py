@@ -20,6 +20,8 @@ from ffr_dyn.compile.structure import Recent, Structure, structure_key
 from ffr_dyn.equations.constraint_rows import Block, blocks_of
 from ffr_dyn.equations.layout import Layout, layout
 from ffr_dyn.equations.state_view import StateView
+from ffr_dyn.functions.time_functions import OPERATION
+from ffr_dyn.kernels.functions import evaluate_functions
 from ffr_dyn.kernels.simd.entry_point import ENTRY_POINTS, CompiledFunction
 from ffr_dyn.kernels.simd.table_address import place_of
 from ffr_dyn.kernels.tables import Functions, Loads, Model
@@ -228,6 +230,25 @@ class UserFunctions:
         given, values = _checked(callback, callback.function(*arguments)), np.zeros(callback.size)
         values[: given.size] = given
         return values
+
+
+def given_at(system: System, t: float, x: Array, v: Array) -> dict[str, Array]:
+    """What the functions of time and Python functions of a scene give at a time [s] and a state, by what they are for.
+
+    Raises what Python functions raise."""
+    functions, user = system.model.functions, system.user
+    values, numbers = np.zeros((functions.kind.size, 3)), np.zeros(user.count)
+    found: dict[str, list[float]] = {}
+    for callback in user.callbacks:
+        own = slice(callback.slot, callback.slot + callback.size)
+        numbers[own] = user.values(callback, t, x, v)
+        if callback.with_state:
+            found.setdefault(callback.what, []).extend(numbers[own])
+    evaluate_functions(functions, numbers, t, values)
+    starts = functions.start[:-1][functions.kind == OPERATION]
+    for k in set(range(values.shape[0])) - set(functions.data[starts[:, None] + [2, 3]].ravel().astype(int).tolist()):
+        found.setdefault(system.purposes[k], []).append(values[k, 0])
+    return {what: np.array(of) for what, of in found.items()}
 
 
 def of_time(callback: Callback, t: float) -> Array:

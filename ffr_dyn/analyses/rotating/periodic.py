@@ -19,6 +19,7 @@ from ffr_dyn.analyses.settings import MomentSettings
 from ffr_dyn.consistency.assemble import Assembled, assemble
 from ffr_dyn.consistency.doubts import checked
 from ffr_dyn.consistency.evaluation import evaluator, joined, record_states
+from ffr_dyn.consistency.following import sudden
 from ffr_dyn.consistency.step_error import OVER_BREAKS, PARTLY_STIFF, Beside, step_errors, untold_breaks, worst
 from ffr_dyn.consistency.tangent import sizes_of
 from ffr_dyn.equations.layout import moved
@@ -137,7 +138,7 @@ def periodic(
         "computed": assembled.computed,
         **(_multipliers(of, found) if floquet else {}),
         **told,
-        "notes": [*assembled.notes, *checked("static", assembled, record), *([UNKNOWN] if check and not told else [])],
+        "notes": [*assembled.notes, *_doubts(assembled, of, record), *([UNKNOWN] if check and not told else [])],
         "status": "complete",
     }
     return with_quantities(replace(result, attributes=attributes), {}, path)
@@ -153,7 +154,8 @@ def _errors(
     except ComputationError:
         return {}
     ratio, order = of.steps / other.steps, PARTLY_STIFF if isinstance(of.method, ROS3) else of.method.order
-    if untold_breaks(system, result.time):
+    found_before = of.fast.jumps[:, 1].tolist() if of.fast else ()
+    if untold_breaks(system, result.time, found_before):
         order = OVER_BREAKS if isinstance(of.method, ROS3) else 1
     beside = Beside(result_of(system, _record(assembled, of, again), {}, None, outputs), ratio)
     errors = step_errors(result, beside, order)
@@ -168,6 +170,13 @@ def _errors(
         far = apart > FAR * np.abs(one)  # steps that damp a mode to nothing have no order yet
         attributes["multiplier_errors"] = np.where(far, apart, apart / abs(ratio**order - 1)).tolist()
     return attributes
+
+
+def _doubts(assembled: Assembled, of: Turns, record: Record) -> list[str]:
+    """Notes on functions of time within steps, and on the rows of a period."""
+    words, breaks = (of.fast.words, of.fast.breaks) if of.fast else ((), np.zeros(0))
+    at_once = sudden(of.system, breaks, of.near.time, of.near.time + of.period)
+    return [*words, *checked("static", assembled, record), *at_once]
 
 
 def _record(assembled: Assembled, of: Turns, found: Returned) -> Record:

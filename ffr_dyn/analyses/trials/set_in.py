@@ -10,12 +10,11 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from ffr_dyn.compile.scene_tables import System
-from ffr_dyn.kernels.functions import evaluate_functions
+from ffr_dyn.compile.scene_tables import System, given_at
 from ffr_dyn.results.result import Result
 from ffr_prep.common.arrays import Array
 
-LOOKS = 400  # rows at most at which functions are evaluated
+LOOKS = 400  # rows at most at which functions are evaluated, while something grows and of the whole run
 EARLY = 1e-13, 1e-3  # of what an output comes to: the sizes from which to which it is looked at
 FOLLOWS = 0.3  # of the decades that an output grows through there: by which its size over the function's may change
 MOST = 10, 90  # percent of rows, between which the others may tremble
@@ -28,23 +27,17 @@ def not_led(run: Result, system: System, x: Array, v: Array, grown: Mapping[str,
     """
     if not grown:
         return {}
-    rows = np.unique(np.linspace(0, run.time.size - 1, LOOKS).round().astype(int))
+    sizes = {name: _sizes(run[name]).max(axis=1) for name in grown}
+    least = max(int(np.count_nonzero(size < EARLY[1] * size[-1])) for size in sizes.values())
+    ends = least, run.time.size - 1
+    rows = np.unique(np.concatenate([np.linspace(0, end, LOOKS).round().astype(int) for end in ends]))
     try:
-        leads = _sizes(np.array([_numbers(system, float(t), x, v) for t in run.time[rows]]))
+        given = [given_at(system, float(t), x, v).values() for t in run.time[rows]]
     except Exception:  # whatever a function of the user raises at a state that is not of its time
         return dict(grown)
+    leads = _sizes(np.array([np.concatenate([*of, np.zeros(0)]) for of in given]))
     leads = leads[:, np.isfinite(leads).all(axis=0) & (leads[-1] > 0)]
-    return {name: size for name, size in grown.items() if not _is_led(_sizes(run[name])[rows].max(axis=1), leads)}
-
-
-def _numbers(system: System, t: float, x: Array, v: Array) -> Array:
-    """Of all functions of time the values, and what Python functions return."""
-    functions, user = system.model.functions, system.user
-    values, given = np.zeros((functions.kind.size, 3)), np.zeros(user.count)
-    for callback in user.callbacks:
-        given[callback.slot : callback.slot + callback.size] = user.values(callback, t, x, v)
-    evaluate_functions(functions, given, t, values)
-    return np.concatenate([values[:, 0], given])
+    return {name: size for name, size in grown.items() if not _is_led(sizes[name][rows], leads)}
 
 
 def _sizes(values: Array) -> Array:

@@ -910,6 +910,7 @@ INPUT = [
             ({"band_of": (0.0, 1.0)}, {"band_of": (1.0, 1.01)}),
             ({"steps": 10}, {"steps": 80}),
             ({"about": "steady"}, {"about": "start"}),
+            ({"scene": replace(SPRUNG, gravity=(fd.harmonic(amplitude=1, frequency=1), 0, 0))}, {"scene": SPRUNG}),
             ({"outputs": []}, {"outputs": ["hinge.angle"]}),
             ({"input": "none", "scene": IDLE}, {"input": "hinge.moment", "scene": IDLE}),
             ({"input": "looking", "scene": IDLE}, {"input": "hinge.moment", "scene": IDLE}),
