@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from ffr_dyn.compile.divided_steps import Rows
 from ffr_dyn.consistency.assemble import Assembled
 from ffr_dyn.consistency.evaluation import Evaluator, accelerations, closed, evaluate, evaluated_mass_matrix, locked
 from ffr_dyn.equations.layout import Layout, to_body_axes, to_global_axes
@@ -25,11 +26,6 @@ from ffr_prep.common.errors import ComputationError, InputError
 
 UNCONTROLLED = 1e20  # absolute tolerance of multipliers
 MOST_STEPS = 100_000  # between two rows
-
-
-Rows = tuple[
-    Array, list[list[tuple[float, float]]]
-]  # output times [s]; from each to the next, parts over which nothing breaks
 
 
 @dataclass(frozen=True)

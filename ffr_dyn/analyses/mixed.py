@@ -38,7 +38,7 @@ from ffr_dyn.analyses.outcome import (
 )
 from ffr_dyn.analyses.registry import OverTime, option
 from ffr_dyn.analyses.settings import Settings
-from ffr_dyn.compile.divided_steps import breaks_of
+from ffr_dyn.compile.divided_steps import Rows, breaks_of, parts_of, within
 from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.consistency.assemble import Assembled, assemble, flattened
 from ffr_dyn.consistency.doubts import SUDDEN, checked
@@ -263,12 +263,15 @@ def _not_collocated(
     if isinstance(chosen, Bounded):
         y = internal_values(whole.own, assembled.x, assembled.v)[: whole.size]
         times, found, other, notes = bounded_solution(whole, chosen, output_step, y, assembled.x, progress)
+        fast = within(assembled.system, start, end, output_step / chosen.parts)
+        notes = [*notes, *(f"{text}; take more `parts` of an output step" for text in (fast.faster if fast else ()))]
         differ = HALF, SURE
     else:
         times, notes = output_times(start, end, output_step), []
-        found = _integrated(own, chosen, times, w, assembled.x, progress)
+        rows = times, parts_of(assembled.system, times, within(assembled.system, start, end, output_step))
+        found = _integrated(own, chosen, rows, w, assembled.x, progress)
         finer = replace(chosen, tolerance=chosen.tolerance / FINER)
-        other = _integrated(own, finer, times, w, assembled.x, None) if own.size else None
+        other = _integrated(own, finer, rows, w, assembled.x, None) if own.size else None
         differ = FINER ** (-1 / ORDER), ORDER
     record, system = _recorded(whole, times, found), whole.free.system
     at_once = sudden(assembled.system, breaks_of(assembled.system, start, end, output_step), start, end)
@@ -340,23 +343,24 @@ def _solution(own: ServoMotion, degree: int, w: Array, x: Array, wanted: Causal 
 
 
 def _integrated(
-    own: ServoMotion, causal: Causal, times: Array, w: Array, x: Array, progress: Callable[[float], None] | None
+    own: ServoMotion, causal: Causal, rows: Rows, w: Array, x: Array, progress: Callable[[float], None] | None
 ) -> Found:
     """Efforts and states at the output times."""
     from scipy.integrate import DOP853
 
+    times = rows[0]
     moments = [at_moment(own, float(times[0]), w, x)]
 
     def right(t: float, w: Array) -> Array:
         return slope(own, t, w, moments[-1].x)[0]
 
     least = 1e-2 * causal.tolerance * np.repeat([1.0, 1.0 / own.lasts], own.size)
-    for before, time in pairwise(times):
-        if own.size:
-            solver = DOP853(right, float(before), w, float(time), rtol=causal.tolerance, atol=least)
+    for (before, time), parts in zip(pairwise(times), rows[1], strict=True):
+        for begin, end in parts if own.size else ():
+            solver = DOP853(right, begin, w, end, rtol=causal.tolerance, atol=least)
             while solver.status == "running":
                 solver.step()
-                creeps = solver.status == "running" and solver.step_size < SHORTEST * (time - before)
+                creeps = solver.status == "running" and solver.step_size < SHORTEST * min(time - before, end - begin)
                 if creeps or solver.status == "failed":
                     raise ComputationError(
                         f"at t = {solver.t:.6g} s the internal dynamics end: their rates grow without bound, as where the "

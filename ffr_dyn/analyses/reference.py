@@ -10,25 +10,22 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 
-from ffr_dyn.analyses.ida import Rows, by_ida
+from ffr_dyn.analyses.ida import by_ida
 from ffr_dyn.analyses.integration import geometry, with_all_reactions
 from ffr_dyn.analyses.outcome import output_times
 from ffr_dyn.analyses.trials.begin import Beginning, begun
-from ffr_dyn.compile.divided_steps import Fast, fast_of
-from ffr_dyn.compile.scene_tables import System
+from ffr_dyn.compile.divided_steps import Rows, fast_of, parts_of
 from ffr_dyn.consistency.assemble import Assembled, assemble
 from ffr_dyn.consistency.doubts import SUDDEN, checked
 from ffr_dyn.consistency.evaluation import Evaluator, accelerations, closed, copied, evaluator, joined
 from ffr_dyn.consistency.following import sudden
 from ffr_dyn.equations.layout import Layout
 from ffr_dyn.equations.motion import position_rates
-from ffr_dyn.functions.breaks import begins
-from ffr_dyn.kernels.tables import EVALUATIONS, SINCE, UNTIL, Record
+from ffr_dyn.kernels.tables import EVALUATIONS, Record
 from ffr_dyn.results.file import save_result
 from ffr_dyn.results.quantities import measure, needs_every_step, selected
 from ffr_dyn.results.recorded_motion import View
@@ -125,7 +122,7 @@ def reference(
         )
     fast = fast_of(system, start, end, output_step, output_step / LOOKS)
     rows: list[Record] = []
-    for time, x, v in _states(assembled, at, (times, _parts_of(system, times, fast)), method):
+    for time, x, v in _states(assembled, at, (times, parts_of(system, times, fast)), method):
         accelerations(at, time, x, v)
         rows.append(copied(at.record))
         if progress is not None:
@@ -151,21 +148,6 @@ def reference(
     if path is not None:
         save_result(result, path)
     return result
-
-
-def _parts_of(system: System, times: Array, fast: Fast | None) -> list[list[tuple[float, float]]]:
-    """From row to row the spans of time in which no function of time breaks, and none turns faster than a solver may see."""
-    breaks, fastest = system.model.functions.breaks[:, [UNTIL, SINCE]], np.zeros((0, 2))
-    if fast is not None:
-        begun_at = np.reshape([begins(t)[:2] for t in (*fast.spans.ravel(), *fast.switches)], (-1, 2))
-        fastest = np.concatenate([fast.jumps, begun_at])
-    cuts = np.unique(np.concatenate([breaks, fastest]), axis=0)
-    found = []
-    for begin, end in pairwise(times.tolist()):
-        within = cuts[(cuts[:, 0] >= begin) & (cuts[:, 1] <= end)]
-        bounds = [begin, *within.ravel().tolist(), end]
-        found.append([(one, other) for one, other in zip(bounds[::2], bounds[1::2], strict=True) if other > one])
-    return found
 
 
 def _states(assembled: Assembled, at: Evaluator, rows: Rows, method: Reference) -> Iterator[tuple[float, Array, Array]]:

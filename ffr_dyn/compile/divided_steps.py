@@ -6,6 +6,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import pairwise
 from math import ceil
 
 import numpy as np
@@ -32,6 +33,10 @@ MOST = 1_000_000  # parts of steps
 SHARP = 1e-7  # of a step: what changes within less may be a pole
 BESIDE = 1e-9  # of a step, by which its parts are longer
 NAMES, TIMES = 3, 3  # in a text
+
+
+Parts = list[list[tuple[float, float]]]  # [s] from each of some times to the next, over which nothing breaks
+Rows = tuple[Array, Parts]  # the times, and what is between them
 
 
 @dataclass(frozen=True)
@@ -99,13 +104,35 @@ def fast_of(system: System, start: float, end: float, output_step: float, step: 
     return _named(system, found, step)
 
 
+def parts_of(system: System, times: Array, fast: Fast | None) -> Parts:
+    """From each of the times (T,) [s] to the next the spans in which no function of time breaks, and none changes faster than
+    a solver that chooses its steps may see."""
+    breaks, fastest = system.model.functions.breaks[:, [UNTIL, SINCE]], np.zeros((0, 2))
+    if fast is not None:
+        begun_at = np.reshape([begins(t)[:2] for t in (*fast.spans.ravel(), *fast.switches)], (-1, 2))
+        fastest = np.concatenate([fast.jumps, begun_at])
+    cuts = np.unique(np.concatenate([breaks, fastest]), axis=0)
+    found = []
+    for begin, end in pairwise(times.tolist()):
+        within = cuts[(cuts[:, 0] >= begin) & (cuts[:, 1] <= end)]
+        bounds = [begin, *within.ravel().tolist(), end]
+        found.append([(one, other) for one, other in zip(bounds[::2], bounds[1::2], strict=True) if other > one])
+    return found
+
+
 def breaks_of(system: System, start: float, end: float, output_step: float) -> Array:
     """(K,) when [s] functions of time switch that do not tell it, for analyses without steps. Raises InputError where one
     grows without bound."""
-    fast = None
-    with suppress(ComputationError):  # it may change many times from row to row
-        fast = fast_of(system, start, end, output_step, output_step)
+    fast = within(system, start, end, output_step)
     return np.zeros(0) if fast is None else fast.breaks
+
+
+def within(system: System, start: float, end: float, output_step: float) -> Fast | None:
+    """What functions of time do within output steps [s]; None, too, where they change many times in each, or tell rates that
+    are not theirs. Raises InputError where one grows without bound."""
+    with suppress(ComputationError):
+        return fast_of(system, start, end, output_step, output_step)
+    return None
 
 
 def _refuse_wrong_rates(system: System, rows: Array) -> None:
