@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import pairwise
 from pathlib import Path
 from typing import Any, ClassVar, get_args
 
@@ -58,7 +57,9 @@ from ffr_dyn.scene.scene import GROUND, Scene, require_scene
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError, InputError
 
-SHORTEST = 1e-8  # step of the internal dynamics, of the time between two rows: shorter ones go nowhere
+# Steps of the internal dynamics, of the time that they are to go through, of which so many one after another go nowhere; the
+# first behind a jump are as short.
+SHORTEST, CREEPS = 1e-8, 20
 HALF, SURE = (
     0.5,
     2,
@@ -355,13 +356,13 @@ def _integrated(
         return slope(own, t, w, moments[-1].x)[0]
 
     least = 1e-2 * causal.tolerance * np.repeat([1.0, 1.0 / own.lasts], own.size)
-    for (before, time), parts in zip(pairwise(times), rows[1], strict=True):
+    for time, parts in zip(times[1:], rows[1], strict=True):
         for begin, end in parts if own.size else ():
-            solver = DOP853(right, begin, w, end, rtol=causal.tolerance, atol=least)
+            solver, short = DOP853(right, begin, w, end, rtol=causal.tolerance, atol=least), 0
             while solver.status == "running":
                 solver.step()
-                creeps = solver.status == "running" and solver.step_size < SHORTEST * min(time - before, end - begin)
-                if creeps or solver.status == "failed":
+                short = short + 1 if solver.step_size < SHORTEST * (end - begin) else 0
+                if short > CREEPS or solver.status == "failed":
                     raise ComputationError(
                         f"at t = {solver.t:.6g} s the internal dynamics end: their rates grow without bound, as where the "
                         "mechanism passes a position in which the unknown forces do not move what is known, or where a force "

@@ -32,6 +32,7 @@ MOST_ROWS = 100_000  # times from which the search begins
 MOST = 1_000_000  # parts of steps
 SHARP = 1e-7  # of a step: what changes within less may be a pole
 BESIDE = 1e-9  # of a step, by which its parts are longer
+BEFORE = 1e-14  # of a time, up to which before a break what is looked at is what comes behind it
 NAMES, TIMES = 3, 3  # in a text
 
 
@@ -112,10 +113,11 @@ def parts_of(system: System, times: Array, fast: Fast | None) -> Parts:
         begun_at = np.reshape([begins(t)[:2] for t in (*fast.spans.ravel(), *fast.switches)], (-1, 2))
         fastest = np.concatenate([fast.jumps, begun_at])
     cuts = np.unique(np.concatenate([breaks, fastest]), axis=0)
+    aside = BEFORE * (np.abs(times).max() + np.ptp(times))
     found = []
     for begin, end in pairwise(times.tolist()):
-        within = cuts[(cuts[:, 0] >= begin) & (cuts[:, 1] <= end)]
-        bounds = [begin, *within.ravel().tolist(), end]
+        within = cuts[(cuts[:, 0] >= begin) & (cuts[:, 1] <= end)] - [aside, 0.0]
+        bounds = [begin, *np.maximum(within, begin).ravel().tolist(), end]
         found.append([(one, other) for one, other in zip(bounds[::2], bounds[1::2], strict=True) if other > one])
     return found
 
