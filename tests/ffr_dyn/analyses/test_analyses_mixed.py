@@ -530,7 +530,7 @@ def test_an_inverted_rod_is_carried_by_leaning_first():
 
 
 PULSES = [
-    ("1e3 * step(t - 0.1417) - 1e3 * step(t - 0.1418)", 0.1),
+    pytest.param("1e3 * step(t - 0.1417) - 1e3 * step(t - 0.1418)", 0.1, marks=pytest.mark.slow),
     pytest.param("1e4 * exp(-((t - 0.1417) / 1e-5)**2)", 0.1 * np.sqrt(np.pi), marks=pytest.mark.slow),
 ]
 
