@@ -43,6 +43,7 @@ from ffr_dyn.integrators import Integrator, Tolerances, Within, method_named, st
 from ffr_dyn.integrators.stabilisation import Baumgarte, Drifting, Projection, Stabilisation
 from ffr_dyn.scene.force_kinds import forces_of
 from ffr_dyn.scene.scene import GROUND, Body, Scene
+from ffr_dyn.scene_file.ambiguous import check_ambiguous, unreadable
 from ffr_dyn.scene_file.assignments import assigned
 from ffr_dyn.scene_file.parameters import Parameters, as_number, nearest, substituted
 from ffr_dyn.scene_file.schema import (
@@ -57,7 +58,7 @@ from ffr_dyn.scene_file.schema import (
     tables,
 )
 from ffr_dyn.scene_file.source import Source, origin, origin_of_name, read_source
-from ffr_dyn.scene_file.state_formula import StateFormula, check_names
+from ffr_dyn.scene_file.state_formula import StateFormula, check_names, quantities_of
 from ffr_prep.body import BodyError, FlexibleBody, damped, load_body, rigid_body, truncated, with_point
 from ffr_prep.common.errors import InputError
 from ffr_prep.common.reading import reading
@@ -149,6 +150,7 @@ def _explained(error: ValidationError, source: Source, tree: Mapping[str, Any]) 
         plain = isinstance(item["input"], (str, int, float, bool, list))
         value = f" (it is {item['input']!r})" if plain and item["type"] != "missing" else ""
         text = _with_nearest(item, where, complaint(item).removeprefix("it: "))
+        text = unreadable(item["input"], tree) or text if isinstance(item["input"], str) else text
         at = (*where, misspelt[1]) if (misspelt := re.match(r"'(.+?)' is not a known entry", text)) else where
         lines[f"{origin(source, at)}: {'.'.join(where) or 'file'}: {text}{value}"] = None
     return "; ".join(lines)
@@ -205,6 +207,7 @@ def _scene(entry: Any, source: Source, given: Mapping[str, str | Path | Flexible
                 check_names(scene, formula, f"force {force.name!r}")
     except InputError as error:
         raise InputError(f"{origin_of_name(source, str(error))}: {error}") from None
+    check_ambiguous(source, set(quantities_of(scene)))
     return scene
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import sys
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 
@@ -229,6 +230,31 @@ def test_a_force_may_be_a_formula_of_the_motion(tmp_path):
     forward(load_scene(written(tmp_path, text))[0], end=0.01, output_step=0.01)
     text = changed("10 * smooth(t / 0.05) * bar.length", "bar.b.positon.x")
     with pytest.raises(InputError, match=r"force 'push': there is no quantity .* did you mean 'bar\.b\.position\.x'"):
+        load_scene(written(tmp_path, text))
+
+
+PUSH = "10 * smooth(t / 0.05) * bar.length"
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"speed =": "hinge.angle = 3\nspeed =", PUSH: "-2 * hinge.angle"}, "'hinge.angle' is a parameter, and what moves"),
+        ({"speed =": "bar.q = 3\nspeed =", PUSH: "-2 * bar.q"}, None),
+        ({"speed =": "hinge.angle = 3\nspeed =", PUSH: "-2 * hinge.angle_rate"}, None),
+        ({"hinge]": "hinge-1]", PUSH: "-2 * hinge-1.angle"}, "formulas cannot hold the name 'hinge-1': .* call it 'hinge_1'"),
+        ({"hinge]": "hinge-a]", "[ground]": "[ground]\n", PUSH: "bar.length - hinge-a.angle"}, "the name 'hinge-a'"),
+        ({"b = [": "b-1 = [", '"bar.b"': '"bar.b-1"', PUSH: "-2 * bar.b-1.position.x"}, "cannot hold the name 'b-1'"),
+        ({"hinge]": "2]", PUSH: "-3 * 2.angle"}, "cannot hold the name '2': .* call it '_2'"),
+    ],
+)  # fmt: skip
+def test_names_in_formulas_of_the_motion_mean_one_thing(tmp_path, changes, words):
+    """A parameter `hinge.angle` was taken for the angle without a word, and of `rod-1.a` the unit 'a' was not known."""
+    text = SCENE
+    for old, new in changes.items():
+        text = text.replace(old, new)
+    said = pytest.raises(InputError, match=rf"scene\.toml, line \d+: loads\.push\.force\.1: .*{words}")
+    with said if words else nullcontext():
         load_scene(written(tmp_path, text))
 
 
