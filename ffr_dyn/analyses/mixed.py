@@ -57,9 +57,9 @@ from ffr_dyn.scene.scene import GROUND, Scene, require_scene
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError, InputError
 
-# Steps of the internal dynamics, of the time that they are to go through, of which so many one after another go nowhere; the
-# first behind a jump are as short.
-SHORTEST, CREEPS = 1e-8, 20
+# A step of the internal dynamics, of the time that they are to go through: shorter ones go nowhere, but for the first of so
+# many, as behind a jump.
+SHORTEST, BEGINS = 1e-8, 10
 HALF, SURE = (
     0.5,
     2,
@@ -358,11 +358,12 @@ def _integrated(
     least = 1e-2 * causal.tolerance * np.repeat([1.0, 1.0 / own.lasts], own.size)
     for time, parts in zip(times[1:], rows[1], strict=True):
         for begin, end in parts if own.size else ():
-            solver, short = DOP853(right, begin, w, end, rtol=causal.tolerance, atol=least), 0
+            solver, steps = DOP853(right, begin, w, end, rtol=causal.tolerance, atol=least), 0
             while solver.status == "running":
                 solver.step()
-                short = short + 1 if solver.step_size < SHORTEST * (end - begin) else 0
-                if short > CREEPS or solver.status == "failed":
+                steps += 1
+                creeps = solver.status == "running" and solver.step_size < SHORTEST * (end - begin) and steps > BEGINS
+                if creeps or solver.status == "failed":
                     raise ComputationError(
                         f"at t = {solver.t:.6g} s the internal dynamics end: their rates grow without bound, as where the "
                         "mechanism passes a position in which the unknown forces do not move what is known, or where a force "
