@@ -113,7 +113,9 @@ def test_a_block_on_an_incline_that_friction_is_to_hold_is_told_why_nothing_does
         gravity=(3.0, -9.0, 0.0),
         ground={"o": (0, 0, 0)},
     )
-    with pytest.raises(fd.InputError, match=r"nothing holds the motion guide\.stroke.*'it' is dry friction made smooth"):
+    with pytest.raises(
+        fd.InputError, match=r"nothing holds the motion guide\.stroke.*'it' is dry friction made smooth"
+    ):
         fd.static(slope)
 
 

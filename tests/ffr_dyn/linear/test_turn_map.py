@@ -80,6 +80,39 @@ def test_a_jump_of_the_rate_of_a_driver_within_a_period_is_told():
     assert any("driver 'cam' changes its rate by 0.6283 m/s at once at t = 0.3 s" in note for note in notes)
 
 
+@pytest.mark.parametrize(
+    ("function", "period", "off"),
+    [
+        (fd.table([0.0, 0.5, 1.0], [0.0, 0.2, 1.0]), 2.0, "off"),
+        (fd.formula("0.3 * sin(2 * pi * t)"), 1.5, "0.6 off"),
+        (fd.formula("0.3 * sin(2 * pi * t)"), 2.0, ""),
+        (fd.formula("0.3"), 2.0, ""),
+    ],
+)
+def test_a_driven_motion_that_does_not_come_back_is_an_error_with_nothing_free_too(function, period, off):
+    """Of a table that ends, the second period, in which all rests, was told as the motion."""
+    held = fd.Driver("cam", "rail", function, coordinate="stroke")
+    scene = replace(oscillator(), loads=(), drivers=(held,))
+    if off:
+        with pytest.raises(fd.ComputationError, match=f"driver 'cam' does not come back after {period:g} s: .* {off}"):
+            fd.periodic(scene, period=period, check=False)
+        return
+    found = fd.periodic(scene, period=period, check=False)
+    np.testing.assert_allclose(found["rail.stroke"], [evaluate(function, t)[0] for t in found.time], atol=1e-9)
+
+
+def test_a_driven_angle_comes_back_by_whole_turns():
+    turning = fd.Scene(
+        (fd.Body("rod", bar("rod", 2.0)),),
+        (fd.Joint("hinge", "revolute", "ground.O", "rod.a"),),
+        drivers=(fd.Driver("motor", "hinge", fd.polynomial(0.1, 5.0)),),
+        ground={"O": (0, 0, 0)},
+    )
+    assert fd.periodic(turning, check=False).attributes["period"] == pytest.approx(0.4 * np.pi)
+    with pytest.raises(fd.ComputationError, match="driver 'motor' does not come back after 1 s"):
+        fd.periodic(turning, period=1.0, check=False)
+
+
 def test_multipliers_of_mathieus_equation():
     """A pendulum whose hinge shakes: theta'' + (g + a w^2 cos w t)/l theta = 0 about its rest, l = 2 L / 3."""
     w, amplitude = 8.0, 0.4
@@ -221,7 +254,7 @@ def test_a_period_that_is_none_is_an_error():
         fd.periodic(oscillator())
     with pytest.raises(fd.InputError, match="positive and finite"):
         fd.periodic(oscillator(), period=-1.0)
-    with pytest.raises(fd.ComputationError, match="not where it began"):
+    with pytest.raises(fd.ComputationError, match=r"driver 'motor' does not come back after 0\.013 s"):
         fd.periodic(flexible_crank(), period=0.013)
     with pytest.raises(fd.ComputationError, match="does not repeat itself"):
         fd.periodic(flexible_crank())
