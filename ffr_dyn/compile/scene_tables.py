@@ -6,6 +6,7 @@ import ctypes
 from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from inspect import signature
 from typing import NamedTuple
 
 import numpy as np
@@ -219,7 +220,9 @@ class UserFunctions:
             try:
                 out[callback.slot : callback.slot + callback.size] = self.values(callback, t, x, v)
             except BaseException as error:
-                self.failure = f"{callback.what} at t = {t:.6g} s: {error or type(error).__name__}"
+                self.failure = (
+                    f"{callback.what} at t = {t:.6g} s: {error or type(error).__name__}{_called_so(callback)}"
+                )
                 self.cause = error
                 return 1
         return 0
@@ -230,6 +233,19 @@ class UserFunctions:
         given, values = _checked(callback, callback.function(*arguments)), np.zeros(callback.size)
         values[: given.size] = given
         return values
+
+
+def _called_so(callback: Callback) -> str:
+    """What a Python function is called with, in words, where it cannot be called so; empty where it can."""
+    try:
+        signature(callback.function).bind(*(None,) * (2 if callback.with_state else 1))
+    except TypeError:
+        if callback.with_state:
+            return "; it is called with (t, state): a function of t alone stands in the place of a number"
+        return "; it is called with t alone: a function of (t, state) goes to `function` of a load or an actuator"
+    except ValueError:  # of what is not written in Python
+        return ""
+    return ""
 
 
 def given_at(system: System, t: float, x: Array, v: Array) -> dict[str, Array]:
