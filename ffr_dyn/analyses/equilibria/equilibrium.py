@@ -266,7 +266,7 @@ class _Problem:
         except Exception as error:  # of a formula, or of a function of the user's
             raise ComputationError(
                 f"the forces are not finite near the equilibrium{self._of_a_force(x)}: {type(error).__name__}: {error}; look "
-                "at its formulas and functions: one of time takes t alone, one of the motion (t, state), and goes to `function`"
+                "at its formulas and functions: one of time takes t alone, one of the motion (t, state) as `function`"
             ) from error
         if not (np.isfinite(now.forces).all() and np.isfinite(now.stiffness).all()):
             raise ComputationError(
