@@ -151,9 +151,19 @@ def _explained(error: ValidationError, source: Source, tree: Mapping[str, Any]) 
         value = f" (it is {item['input']!r})" if plain and item["type"] != "missing" else ""
         text = _with_nearest(item, where, complaint(item).removeprefix("it: "))
         text = unreadable(item["input"], tree) or text if isinstance(item["input"], str) else text
+        text += _of_the_angle(where, text, tree)
         at = (*where, misspelt[1]) if (misspelt := re.match(r"'(.+?)' is not a known entry", text)) else where
         lines[f"{origin(source, at)}: {'.'.join(where) or 'file'}: {text}{value}"] = None
     return "; ".join(lines)
+
+
+def _of_the_angle(where: tuple[str, ...], text: str, tree: Mapping[str, Any]) -> str:
+    """That a unit does not fit as the coordinate of a joint is not given, which is its angle then; empty where it is."""
+    table, name, *_ = *where, "", ""
+    entry = tree.get(table, {}).get(name) if table in ("forces", "drivers") else None
+    if not isinstance(entry, dict) or "joint" not in entry or "coordinate" in entry or "does not fit" not in text:
+        return ""
+    return '; without a coordinate it is about the angle: write coordinate = "stroke" for one along the joint'
 
 
 def _likeliest(items: Sequence[Any]) -> list[Any]:

@@ -258,6 +258,30 @@ def test_names_in_formulas_of_the_motion_mean_one_thing(tmp_path, changes, words
         load_scene(written(tmp_path, text))
 
 
+@pytest.mark.parametrize(
+    ("given", "hint"),
+    [('creep = "1 mm/s"', True), ('coordinate = "angle"\ncreep = "1 mm/s"', False), ('creep = "1 kg"', True)],
+)
+def test_a_unit_of_a_stroke_asks_for_the_coordinate(tmp_path, given, hint):
+    force = f'[forces.dry]\nkind = "joint-friction"\njoint = "hinge"\ncoulomb = 3\n{given}\n'
+    with pytest.raises(InputError, match=r"forces\.dry\.creep: .* does not fit: this is given in rad/s") as caught:
+        load_scene(written(tmp_path, SCENE + force))
+    assert ('write coordinate = "stroke"' in str(caught.value)) == hint
+
+
+@pytest.mark.parametrize(
+    ("rows", "words"),
+    [
+        ("0, 5\n2, 3\n1, 2\n", r"rows\.csv: the times of a table must increase; after 2 s comes 1 s, in row 3"),
+        ("0, 5\n", r"rows\.csv: a table needs two or more times and as many values, not 1 and 1"),
+    ],
+)
+def test_a_file_of_rows_that_are_no_table_is_named(tmp_path, rows, words):
+    (tmp_path / "rows.csv").write_text(rows)
+    with pytest.raises(InputError, match=words):
+        load_scene(written(tmp_path, changed('"10 * smooth(t / 0.05) * bar.length"', '{table_file = "rows.csv"}')))
+
+
 def test_an_actuator_may_be_a_formula_of_the_motion(tmp_path):
     """A damper at the hinge by formula, and the same as a joint spring without stiffness."""
     kinds = (
@@ -343,7 +367,7 @@ MOTOR = '[drivers.m]\njoint = "hinge"\nfunction = '
         ('"30 rpm"', '"30 * lenght"', []),
         ("speed =", "sin =", ["parameters.sin", "taken"]),
         ("speed =", '"a b" =', ["parameters.a b", "cannot be a parameter's name"]),
-        ("[drivers]", MOTOR + '{table = [[0, 2, 1], [0, 1, 2]]}', ["drivers.m.function", "increasing"]),
+        ("[drivers]", MOTOR + '{table = [[0, 2, 1], [0, 1, 2]]}', ["drivers.m.function", "must increase; after 2 s comes 1 s"]),
         ("[drivers]", MOTOR + '{table = [[0, 1]]}', ["drivers.m", "table"]),
         ("[drivers]", MOTOR + '{polynomial = [1], formula = "t"}', ["exactly one of"]),
         ("[drivers]", MOTOR + '{table_file = "none.csv"}', ["none.csv does not exist"]),
