@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from ffr_dyn.compile.divided_steps import Rows
 from ffr_dyn.consistency.assemble import Assembled
 from ffr_dyn.consistency.evaluation import Evaluator, accelerations, closed, evaluate, evaluated_mass_matrix, locked
 from ffr_dyn.equations.layout import Layout, to_body_axes, to_global_axes
@@ -40,9 +41,12 @@ class _Parts:
 
 
 def by_ida(
-    assembled: Assembled, at: Evaluator, times: Array, rtol: float, atol: float
+    assembled: Assembled, at: Evaluator, rows: Rows, rtol: float, atol: float
 ) -> Iterator[tuple[float, Array, Array]]:
-    """(time, x, v) at the output times. Raises InputError without the package, ComputationError when IDA gives up."""
+    """(time, x, v) at the output times.
+
+    Raises InputError without the package, ComputationError when IDA gives up.
+    """
     try:
         from sksundae.ida import IDA
     except ImportError:
@@ -63,17 +67,22 @@ def by_ida(
         "max_num_steps": MOST_STEPS,
     }
     solver = IDA(residual, **options)
-    x, v = assembled.x, assembled.v
-    yield float(times[0]), x, v
-    solver.init_step(float(times[0]), *_start(at, part, float(times[0]), x, v))
-    for time in times[1:].tolist():
-        done = solver.step(time, tstop=time)
-        if not done.success or not np.isfinite(done.y).all():
-            raise ComputationError(
-                f"IDA stopped before t = {time:.6g} s: {done.message}; use other tolerances or another method, or "
-                "end before a position in which the mechanism locks"
-            )
-        yield time, *closed(at, time, done.y[part.x].copy(), done.y[part.v].copy())
+    (first, *later), (x, v), ended = rows[0].tolist(), (assembled.x, assembled.v), None
+    yield first, x, v
+    for time, parts in zip(later, rows[1], strict=True):
+        for begin, end in parts:
+            if begin != ended:
+                x, v = closed(at, begin, x, v)
+                solver.init_step(begin, *_start(at, part, begin, x, v))
+            done, ended = solver.step(end, tstop=end), end
+            if not done.success or not np.isfinite(done.y).all():
+                raise ComputationError(
+                    f"IDA stopped before t = {end:.6g} s: {done.message}; use other tolerances or another method, or "
+                    "end before a position in which the mechanism locks"
+                )
+            x, v = done.y[part.x].copy(), done.y[part.v].copy()
+        x, v = closed(at, time, x, v)
+        yield time, x, v
 
 
 def _parts(assembled: Assembled) -> _Parts:

@@ -28,7 +28,7 @@ from ffr_dyn.compile.structure import Structure
 from ffr_dyn.consistency.assemble import assemble, seen_in_space
 from ffr_dyn.consistency.doubts import KINK, checked
 from ffr_dyn.consistency.evaluation import Evaluator, evaluate, evaluator
-from ffr_dyn.consistency.kinks import check_sizes, kinked_forces
+from ffr_dyn.consistency.kinks import check_sizes, held_by_nothing, kinked_forces
 from ffr_dyn.consistency.tangent import STEP, Chart, at_rest, chart, derivative, rates, sizes, state, state_matrix
 from ffr_dyn.equations.forces import At
 from ffr_dyn.equations.layout import to_global_axes
@@ -244,11 +244,13 @@ def linearised(
     evaluate(at, time, assembled.x, assembled.v)
     unit = main_parts(parts) / np.sqrt(np.maximum((np.abs(solved.parts) ** 2).sum(axis=(0, 1)), 1e-300))
     strained = prestrained(*where, assembled.x, solved.values, unit)
+    here = _here(_without_inputs(near, inputs))
     notes = (
         *assembled.notes,
         *_notes(near, steady, A, rounding),
         *solved.notes,
-        *checked("linearise", assembled, at.record, {KINK: kinked_forces(_here(_without_inputs(near, inputs)))}),
+        *checked("linearise", assembled, at.record, {KINK: kinked_forces(here)}),
+        *held_by_nothing(here),
     )
     notes = (*notes, *told(strained, leading[strained.mode]))
     driven = tuple(driver.name for driver in scene.drivers)

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import pairwise
 from pathlib import Path
 from typing import Any, ClassVar, get_args
 
@@ -38,7 +37,7 @@ from ffr_dyn.analyses.outcome import (
 )
 from ffr_dyn.analyses.registry import OverTime, option
 from ffr_dyn.analyses.settings import Settings
-from ffr_dyn.compile.divided_steps import breaks_of
+from ffr_dyn.compile.divided_steps import Rows, breaks_of, parts_of, within
 from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.consistency.assemble import Assembled, assemble, flattened
 from ffr_dyn.consistency.doubts import SUDDEN, checked
@@ -58,7 +57,9 @@ from ffr_dyn.scene.scene import GROUND, Scene, require_scene
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError, InputError
 
-SHORTEST = 1e-8  # step of the internal dynamics, of the time between two rows: shorter ones go nowhere
+# A step of the internal dynamics, of the time that they are to go through: shorter ones go nowhere, but for the first of so
+# many, as behind a jump.
+SHORTEST, BEGINS = 1e-8, 10
 HALF, SURE = (
     0.5,
     2,
@@ -263,12 +264,15 @@ def _not_collocated(
     if isinstance(chosen, Bounded):
         y = internal_values(whole.own, assembled.x, assembled.v)[: whole.size]
         times, found, other, notes = bounded_solution(whole, chosen, output_step, y, assembled.x, progress)
+        fast = within(assembled.system, start, end, output_step / chosen.parts)
+        notes = [*notes, *(f"{text}; take more `parts` of an output step" for text in (fast.faster if fast else ()))]
         differ = HALF, SURE
     else:
         times, notes = output_times(start, end, output_step), []
-        found = _integrated(own, chosen, times, w, assembled.x, progress)
+        rows = times, parts_of(assembled.system, times, within(assembled.system, start, end, output_step))
+        found = _integrated(own, chosen, rows, w, assembled.x, progress)
         finer = replace(chosen, tolerance=chosen.tolerance / FINER)
-        other = _integrated(own, finer, times, w, assembled.x, None) if own.size else None
+        other = _integrated(own, finer, rows, w, assembled.x, None) if own.size else None
         differ = FINER ** (-1 / ORDER), ORDER
     record, system = _recorded(whole, times, found), whole.free.system
     at_once = sudden(assembled.system, breaks_of(assembled.system, start, end, output_step), start, end)
@@ -340,23 +344,25 @@ def _solution(own: ServoMotion, degree: int, w: Array, x: Array, wanted: Causal 
 
 
 def _integrated(
-    own: ServoMotion, causal: Causal, times: Array, w: Array, x: Array, progress: Callable[[float], None] | None
+    own: ServoMotion, causal: Causal, rows: Rows, w: Array, x: Array, progress: Callable[[float], None] | None
 ) -> Found:
     """Efforts and states at the output times."""
     from scipy.integrate import DOP853
 
+    times = rows[0]
     moments = [at_moment(own, float(times[0]), w, x)]
 
     def right(t: float, w: Array) -> Array:
         return slope(own, t, w, moments[-1].x)[0]
 
     least = 1e-2 * causal.tolerance * np.repeat([1.0, 1.0 / own.lasts], own.size)
-    for before, time in pairwise(times):
-        if own.size:
-            solver = DOP853(right, float(before), w, float(time), rtol=causal.tolerance, atol=least)
+    for time, parts in zip(times[1:], rows[1], strict=True):
+        for begin, end in parts if own.size else ():
+            solver, steps = DOP853(right, begin, w, end, rtol=causal.tolerance, atol=least), 0
             while solver.status == "running":
                 solver.step()
-                creeps = solver.status == "running" and solver.step_size < SHORTEST * (time - before)
+                steps += 1
+                creeps = solver.status == "running" and solver.step_size < SHORTEST * (end - begin) and steps > BEGINS
                 if creeps or solver.status == "failed":
                     raise ComputationError(
                         f"at t = {solver.t:.6g} s the internal dynamics end: their rates grow without bound, as where the "

@@ -2,14 +2,14 @@
 
 SciPy's solvers integrate the index-1 equations, (x_dot, v_dot) = (T(x) v, M^-1 (f - Phi_q^T lam)), and the state is projected
 onto the constraints at every output row. SUNDIALS' IDA solves the stabilised index-2 equations (`ffr_dyn.analyses.ida`).
-All error control and step selection are theirs; ours is the evaluation of the equations.
+All error control and step selection are theirs; ours is the evaluation of the equations. They begin anew where a function of
+time breaks, and end a step where one changes faster than rows are apart: they never see what is between their steps.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -18,9 +18,11 @@ from ffr_dyn.analyses.ida import by_ida
 from ffr_dyn.analyses.integration import geometry, with_all_reactions
 from ffr_dyn.analyses.outcome import output_times
 from ffr_dyn.analyses.trials.begin import Beginning, begun
+from ffr_dyn.compile.divided_steps import Rows, fast_of, parts_of
 from ffr_dyn.consistency.assemble import Assembled, assemble
-from ffr_dyn.consistency.doubts import checked
+from ffr_dyn.consistency.doubts import SUDDEN, checked
 from ffr_dyn.consistency.evaluation import Evaluator, accelerations, closed, copied, evaluator, joined
+from ffr_dyn.consistency.following import sudden
 from ffr_dyn.equations.layout import Layout
 from ffr_dyn.equations.motion import position_rates
 from ffr_dyn.kernels.tables import EVALUATIONS, Record
@@ -34,6 +36,7 @@ from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError, InputError
 
 SOLVERS = ("DOP853", "Radau", "LSODA", "BDF", "RK45")
+LOOKS = 4  # steps from row to row, within which functions of time are looked at for what they do there
 DIFFERENCE = 1e-7  # of a coordinate, for Jacobians
 
 
@@ -111,20 +114,22 @@ def reference(
         raise InputError(f"method is {method!r}; give SciPy() or IDA() here, and methods of steps to `forward`")
     times = output_times(start, end, output_step)
     assembled = begun(assemble(scene, time=start), start, begin)
-    at = evaluator(assembled.system)
-    wanted = selected(assembled.system, outputs)
+    system = assembled.system
+    at, wanted = evaluator(system), selected(system, outputs)
     if needs_every_step(wanted):
         raise InputError(
             "work adds up over the steps of a method, which the solvers do not tell; keep the power instead"
         )
+    fast = fast_of(system, start, end, output_step, output_step / LOOKS)
     rows: list[Record] = []
-    for time, x, v in _states(assembled, at, times, method):
+    for time, x, v in _states(assembled, at, (times, parts_of(system, times, fast)), method):
         accelerations(at, time, x, v)
         rows.append(copied(at.record))
         if progress is not None:
             progress(time)
     record = with_all_reactions(assembled, joined(rows))
-    quantities, _ = measure(View(assembled.system, record), {}, wanted)
+    quantities, _ = measure(View(system, record), {}, wanted)
+    at_once = sudden(system, np.zeros(0) if fast is None else fast.breaks, start, end)
     attributes = {
         **described(scene),
         "analysis": "forward dynamics",
@@ -136,7 +141,7 @@ def reference(
         "degrees_of_freedom": assembled.degrees_of_freedom,
         "computed": assembled.computed,
         "evaluations": int(at.work.info[EVALUATIONS]),
-        "notes": [*assembled.notes, *checked("forward", assembled, record)],
+        "notes": [*assembled.notes, *checked("forward", assembled, record, {SUDDEN: at_once})],
         "status": "complete",
     }
     result = Result(record.time, quantities, geometry(scene), attributes)
@@ -145,39 +150,47 @@ def reference(
     return result
 
 
-def _states(
-    assembled: Assembled, at: Evaluator, times: Array, method: Reference
-) -> Iterator[tuple[float, Array, Array]]:
+def _states(assembled: Assembled, at: Evaluator, rows: Rows, method: Reference) -> Iterator[tuple[float, Array, Array]]:
     """(time, x, v) at the output times."""
     if isinstance(method, SciPy):
-        return _by_scipy(assembled, at, times, method)
-    return by_ida(assembled, at, times, method.rtol, method.atol)
+        return _by_scipy(assembled, at, rows, method)
+    return by_ida(assembled, at, rows, method.rtol, method.atol)
 
 
-def _by_scipy(assembled: Assembled, at: Evaluator, times: Array, method: SciPy) -> Iterator[tuple[float, Array, Array]]:
-    """From row to row, each from where the state was projected to, with the last step of the row before as a first guess."""
+def _by_scipy(assembled: Assembled, at: Evaluator, rows: Rows, method: SciPy) -> Iterator[tuple[float, Array, Array]]:
+    """From part to part, each from where the state is projected to, first by the longest step of the one before."""
+    (first, *later), (x, v), step = rows[0].tolist(), (assembled.x, assembled.v), np.inf
+    yield first, x, v
+    for time, parts in zip(later, rows[1], strict=True):
+        for begin, end in parts:
+            x, v, step = _over(assembled, at, method, (begin, end, x, v, step))
+        x, v = closed(at, time, x, v)
+        yield time, x, v
+
+
+def _over(
+    assembled: Assembled, at: Evaluator, method: SciPy, part: tuple[float, float, Array, Array, float]
+) -> tuple[Array, Array, float]:
+    """(x, v) at the end of a part, and the longest step; part : its begin and end, the state, and the step before [s]."""
     from scipy.integrate import solve_ivp
 
-    place, x, v = assembled.system.layout, assembled.x, assembled.v
+    place, (begin, end, x, v, step) = assembled.system.layout, part
     implicit = {"jac": lambda t, y: _jacobian(at, place, t, y)} if method.solver in ("Radau", "BDF") else {}
-    yield float(times[0]), x, v
-    step = None
-    for begin, end in pairwise(times):
-        done = solve_ivp(
-            lambda t, y: _rates(at, place, t, y),
-            (begin, end),
-            np.concatenate([x, v]),
-            method=method.solver,
-            rtol=method.rtol,
-            atol=method.atol,
-            first_step=None if step is None else min(step, end - begin),
-            **implicit,
-        )
-        if not done.success:
-            raise ComputationError(f"{method.solver} stopped at t = {done.t[-1]:.6g} s: {done.message}")
-        step = float(np.diff(done.t).max())
-        x, v = closed(at, float(end), *np.split(done.y[:, -1], [place.x_size]))
-        yield float(end), x, v
+    x, v = closed(at, begin, x, v)
+    done = solve_ivp(
+        lambda t, y: _rates(at, place, t, y),
+        (begin, end),
+        np.concatenate([x, v]),
+        method=method.solver,
+        rtol=method.rtol,
+        atol=method.atol,
+        first_step=None if step == np.inf else min(step, end - begin),
+        **implicit,
+    )
+    if not done.success:
+        raise ComputationError(f"{method.solver} stopped at t = {done.t[-1]:.6g} s: {done.message}")
+    x, v = np.split(done.y[:, -1], [place.x_size])
+    return x, v, float(np.diff(done.t).max())
 
 
 def _rates(at: Evaluator, place: Layout, time: float, y: Array) -> Array:

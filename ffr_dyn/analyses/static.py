@@ -38,6 +38,7 @@ from ffr_dyn.kernels.tables import EVALUATIONS
 from ffr_dyn.results.quantities import selected
 from ffr_dyn.results.result import Result
 from ffr_dyn.scene.described import described
+from ffr_dyn.scene.force_kinds import forces_of
 from ffr_dyn.scene.scene import Scene, length_of
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError, InputError
@@ -158,9 +159,10 @@ def _not_held(
     motion = named_motion(system.scene, system.layout, x, direction)
     rigid = rigid_freedom(system.scene, assembled, time)
     counts = counted(assembled.degrees_of_freedom, rigid, sum(system.layout.n), len(assembled.redundant))
+    slides = [text for force in forces_of(system.scene) if (text := force.at_rest(0.0))]
     return InputError(
         f"{what}: nothing holds the motion {motion}{there}; add a joint, a driver or a spring that does, or start nearer to "
-        f"an equilibrium{otherwise} ({counts})"
+        f"an equilibrium{otherwise} ({'; '.join([counts, *slides])})"
     )
 
 
@@ -185,6 +187,7 @@ def _result(
     lowest, flutter, branch = seen
     stable = lowest > 0 and not flutter
     notes = [*assembled.notes, *checked("static", assembled, record), *([branch] if branch else [])]
+    notes += [text for force in forces_of(assembled.system.scene) if (text := force.at_rest(0.0))]
     if flutter:
         notes.append(f"the equilibrium is unstable: without damping it flutters, at {flutter:.4g} Hz")
     elif not stable:

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import pairwise
 from math import ceil
 
 import numpy as np
@@ -31,7 +32,12 @@ MOST_ROWS = 100_000  # times from which the search begins
 MOST = 1_000_000  # parts of steps
 SHARP = 1e-7  # of a step: what changes within less may be a pole
 BESIDE = 1e-9  # of a step, by which its parts are longer
+BEFORE = 1e-14  # of a time, up to which before a break what is looked at is what comes behind it
 NAMES, TIMES = 3, 3  # in a text
+
+
+Parts = list[list[tuple[float, float]]]  # [s] from each of some times to the next, over which nothing breaks
+Rows = tuple[Array, Parts]  # the times, and what is between them
 
 
 @dataclass(frozen=True)
@@ -99,18 +105,41 @@ def fast_of(system: System, start: float, end: float, output_step: float, step: 
     return _named(system, found, step)
 
 
+def parts_of(system: System, times: Array, fast: Fast | None) -> Parts:
+    """From each of the times (T,) [s] to the next the spans in which no function of time breaks, and none changes faster than
+    a solver that chooses its steps may see."""
+    breaks, fastest = system.model.functions.breaks[:, [UNTIL, SINCE]], np.zeros((0, 2))
+    if fast is not None:
+        begun_at = np.reshape([begins(t)[:2] for t in (*fast.spans.ravel(), *fast.switches)], (-1, 2))
+        fastest = np.concatenate([fast.jumps, begun_at])
+    cuts = np.unique(np.concatenate([breaks, fastest]), axis=0)
+    aside = BEFORE * (np.abs(times).max() + np.ptp(times))
+    found = []
+    for begin, end in pairwise(times.tolist()):
+        within = cuts[(cuts[:, 0] >= begin) & (cuts[:, 1] <= end)] - [aside, 0.0]
+        bounds = [begin, *np.maximum(within, begin).ravel().tolist(), end]
+        found.append([(one, other) for one, other in zip(bounds[::2], bounds[1::2], strict=True) if other > one])
+    return found
+
+
 def breaks_of(system: System, start: float, end: float, output_step: float) -> Array:
     """(K,) when [s] functions of time switch that do not tell it, for analyses without steps. Raises InputError where one
     grows without bound."""
-    fast = None
-    with suppress(ComputationError):  # it may change many times from row to row
-        fast = fast_of(system, start, end, output_step, output_step)
+    fast = within(system, start, end, output_step)
     return np.zeros(0) if fast is None else fast.breaks
+
+
+def within(system: System, start: float, end: float, output_step: float) -> Fast | None:
+    """What functions of time do within output steps [s]; None, too, where they change many times in each, or tell rates that
+    are not theirs. Raises InputError where one grows without bound."""
+    with suppress(ComputationError):
+        return fast_of(system, start, end, output_step, output_step)
+    return None
 
 
 def _refuse_wrong_rates(system: System, rows: Array) -> None:
     for callback in system.user.callbacks:
-        if not callback.with_state and (wrong := wrong_rate(partial(of_time, callback), rows, min(callback.sizes) - 1)):
+        if not callback.with_state and (wrong := wrong_rate(partial(of_time, callback), rows)):
             raise ComputationError(misled(callback.what, *wrong))
 
 
@@ -156,7 +185,7 @@ def _refuse_poles(system: System, made: Made, found: Changes, span: tuple[float,
     start, end, step = span
     narrow = found.spans[found.spans[:, 1] - found.spans[:, 0] < SHARP * step]
     breaks = system.model.functions.breaks[:, [UNTIL, SINCE]]
-    times = np.concatenate([0.5 * ends.sum(axis=1) for ends in (narrow, found.jumps, breaks)])
+    times = np.concatenate([[start, end], *(0.5 * ends.sum(axis=1) for ends in (narrow, found.jumps, breaks))])
     sample = partial(_sampled, system, partial(_no_python, system))
     at = pole(sample, made.roots, times[(times >= start) & (times <= end)], step)
     if at:

@@ -35,7 +35,12 @@ def alike(scene: Scene, place: Layout) -> list[Hashable]:
 def row_numbers(blocks: tuple[Block, ...], functions: FunctionTable) -> tuple[Array, Array, Array]:
     """`Rows.axes`, `.relation` and `.function` of all blocks; their functions of time go to `functions`."""
     said = [(block, word) for block in blocks for word in block.words]
-    function = [-1 if w.function is None else functions.add(w.function, f"{b.name!r}", derivatives=2) for b, w in said]
+    function = [
+        -1
+        if w.function is None
+        else functions.add(w.function, f"{'driver' if b.driver else 'joint'} {b.name!r}", derivatives=2)
+        for b, w in said
+    ]
     axes = np.zeros((len(said), 6, 3))
     for row, (_, word) in enumerate(said):
         axes[row, : len(word.axes)] = word.axes

@@ -6,6 +6,7 @@ import ctypes
 from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from inspect import signature
 from typing import NamedTuple
 
 import numpy as np
@@ -20,6 +21,8 @@ from ffr_dyn.compile.structure import Recent, Structure, structure_key
 from ffr_dyn.equations.constraint_rows import Block, blocks_of
 from ffr_dyn.equations.layout import Layout, layout
 from ffr_dyn.equations.state_view import StateView
+from ffr_dyn.functions.time_functions import OPERATION
+from ffr_dyn.kernels.functions import evaluate_functions
 from ffr_dyn.kernels.simd.entry_point import ENTRY_POINTS, CompiledFunction
 from ffr_dyn.kernels.simd.table_address import place_of
 from ffr_dyn.kernels.tables import Functions, Loads, Model
@@ -215,18 +218,53 @@ class UserFunctions:
         out = _at(out_address, self.count)
         for callback in self.callbacks:
             try:
-                out[callback.slot : callback.slot + callback.size] = self._values(callback, t, x, v)
+                out[callback.slot : callback.slot + callback.size] = self.values(callback, t, x, v)
             except BaseException as error:
-                self.failure = f"{callback.what} at t = {t:.6g} s: {error or type(error).__name__}"
+                self.failure = (
+                    f"{callback.what} at t = {t:.6g} s: {error or type(error).__name__}{_called_so(callback)}"
+                )
                 self.cause = error
                 return 1
         return 0
 
-    def _values(self, callback: Callback, t: float, x: Array, v: Array) -> Array:
+    def values(self, callback: Callback, t: float, x: Array, v: Array) -> Array:
+        """(callback.size,) what a function returns, zero for what it does not. Raises what it raises."""
         arguments = (t, StateView(self.scene, self.place, x, v)) if callback.with_state else (t,)
         given, values = _checked(callback, callback.function(*arguments)), np.zeros(callback.size)
         values[: given.size] = given
         return values
+
+
+def _called_so(callback: Callback) -> str:
+    """What a Python function is called with, in words, where it cannot be called so; empty where it can."""
+    try:
+        signature(callback.function).bind(*(None,) * (2 if callback.with_state else 1))
+    except TypeError:
+        if callback.with_state:
+            return "; it is called with (t, state): a function of t alone stands in the place of a number"
+        return "; it is called with t alone: a function of (t, state) goes to `function` of a load or an actuator"
+    except ValueError:  # of what is not written in Python
+        return ""
+    return ""
+
+
+def given_at(system: System, t: float, x: Array, v: Array) -> dict[str, Array]:
+    """What the functions of time and Python functions of a scene give at a time [s] and a state, by what they are for.
+
+    Raises what Python functions raise."""
+    functions, user = system.model.functions, system.user
+    values, numbers = np.zeros((functions.kind.size, 3)), np.zeros(user.count)
+    found: dict[str, list[float]] = {}
+    for callback in user.callbacks:
+        own = slice(callback.slot, callback.slot + callback.size)
+        numbers[own] = user.values(callback, t, x, v)
+        if callback.with_state:
+            found.setdefault(callback.what, []).extend(numbers[own])
+    evaluate_functions(functions, numbers, t, values)
+    starts = functions.start[:-1][functions.kind == OPERATION]
+    for k in set(range(values.shape[0])) - set(functions.data[starts[:, None] + [2, 3]].ravel().astype(int).tolist()):
+        found.setdefault(system.purposes[k], []).append(values[k, 0])
+    return {what: np.array(of) for what, of in found.items()}
 
 
 def of_time(callback: Callback, t: float) -> Array:

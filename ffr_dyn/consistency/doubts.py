@@ -152,9 +152,7 @@ def look(seen: Seen, view: View) -> None:
     if seen.scene.drivers:
         arrays["driven"][:] = np.maximum(arrays["driven"], np.array([_driven(view, d) for d in seen.scene.drivers]).T)
     for number, callback in enumerate(system.user.callbacks):
-        if not callback.with_state and (
-            wrong := wrong_rate(partial(of_time, callback), rows.time, min(callback.sizes) - 1)
-        ):
+        if not callback.with_state and (wrong := wrong_rate(partial(of_time, callback), rows.time)):
             arrays["told"][:, number] = wrong
     for number, (callback, joint) in enumerate(_read_angles(system)):
         arrays["torn"][:, number] = _torn(callback, joint, view, arrays["torn"][:, number])

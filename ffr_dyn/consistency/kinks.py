@@ -48,6 +48,21 @@ def kinked_forces(now: At) -> list[str]:
     return [_told(force, by) for force in forces_of(now.scene) if (by := _kinks(total, now, force))]
 
 
+def held_by_nothing(now: At) -> list[str]:
+    """Notes on the forces that hold at rest what they do not hold here, a sentence each."""
+    total = nothing_on(all_placed(now), now.place.v_size)
+    return [text for force in forces_of(now.scene) if (text := force.at_rest(_rate(total, now, force)))]
+
+
+def _rate(total: Sums, now: At, force: Force) -> float:
+    """The rate of a force's coordinate, where it has one."""
+    if isinstance(force.place, AtMarker | OnBody):
+        return 0.0
+    ends = force.place.ends(now.scene)
+    jets = coordinates(now.scene, pair(*(total.placed[number] for number in ends)), force.place)
+    return float((total.gradient(ends, np.array([jet.first for jet in jets])) @ now.velocities)[0]) if jets else 0.0
+
+
 def _told(force: Force, by: list[str]) -> str:
     return (
         f"force {force.name!r} has a kink just at this state: by {' and '.join(by)} it changes otherwise on one side than on "

@@ -109,9 +109,14 @@ def table(times: Array, values: Array) -> TimeFunction:
     from scipy.interpolate import CubicSpline
 
     t, y = numbers_in("times of a table", times), numbers_in("values of a table", values)
-    if t.ndim != 1 or t.shape != y.shape or t.size < 2 or not (np.diff(t) > 0).all():
-        raise InputError("a table needs two or more increasing times and as many values")
+    if t.ndim != 1 or t.shape != y.shape or t.size < 2:
+        raise InputError(f"a table needs two or more times and as many values, not {t.size} and {y.size}")
     _numbers("table", (*t, *y))
+    if not (np.diff(t) > 0).all():
+        first = int(np.argmin(np.diff(t) > 0))
+        raise InputError(
+            f"the times of a table must increase; after {t[first]:g} s comes {t[first + 1]:g} s, in row {first + 2}"
+        )
     try:
         with np.errstate(all="ignore"):
             c = CubicSpline(t, y).c

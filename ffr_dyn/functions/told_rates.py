@@ -28,19 +28,23 @@ class WrongRate(NamedTuple):
     order: int
 
 
-def wrong_rate(function: Callable[[float], Array], times: Array, order: int) -> WrongRate | None:
-    """The worst of the derivatives up to an order, where most of a motion at these times has others than are told.
+def wrong_rate(function: Callable[[float], Array], times: Array) -> WrongRate | None:
+    """The worst of the derivatives that are told, where most of a motion at these times has others.
 
-    function : t [s] -> (3,) value, rate and second derivative. None, too, where it has no values beside the times
+    function : t [s] -> (3,) value, rate and second derivative, NaN for what it does not tell. None, too, where it has no
+               values beside the times
     """
     chosen: Array = times[np.unique(np.linspace(0, times.size - 1, LOOKED).round().astype(int))]
     apart = BESIDE * float(np.diff(times).min()) if times.size > 1 else ALONE
     apart = max(apart, 1e4 * float(np.spacing(np.abs(times[-1]))))
     try:
-        at, *beside = (np.array([function(t + side * apart) for t in chosen]) for side in (0, -1, 1, -FARTHER, FARTHER))
+        at = np.array([function(t) for t in chosen])
+        orders = [number for number in (1, 2) if np.isfinite(at[:, : number + 1]).all()]
+        sides = (-1, 1, -FARTHER, FARTHER) if orders else ()
+        beside = [np.array([function(t + side * apart) for t in chosen]) for side in sides]
     except Exception:  # whatever a function of the user raises where it has no values
         return None
-    for number in range(1, order + 1):
+    for number in orders:
         told: Array = at[:, number]
         before = [other[:, number - 1] - at[:, number - 1] for other in beside]
         near = _nearer(told, before[0] / -apart, before[1] / apart)

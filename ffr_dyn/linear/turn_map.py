@@ -10,10 +10,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
+from ffr_dyn.compile.divided_steps import Fast, divided, fast_of
 from ffr_dyn.compile.engine import Engine, fill_rows, new_engine
 from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.compile.workspace import new_record
@@ -51,6 +53,7 @@ class Turns:
     across : (V, C) motions across the free ones, M^-1 jacobian^T
     sizes : (V,) what counts as a movement of one
     rows : of the record of a period, a part of the steps
+    fast : what functions of time do within steps, over two periods
     """
 
     near: Chart
@@ -60,10 +63,16 @@ class Turns:
     period: float
     steps: int
     rows: int
+    fast: Fast | None = None
 
     @property
     def system(self) -> System:
         return self.near.at.system
+
+    @cached_property
+    def divided(self) -> System:
+        """The system whose steps are divided where functions of time change faster."""
+        return self.system if self.fast is None else divided(self.system, self.fast, self.method.step)
 
     @property
     def scale(self) -> Array:
@@ -73,16 +82,18 @@ class Turns:
 
 
 def turns(system: System, time: float, x: Array, v: Array, method: Integrator, period: float) -> Turns:
-    """The map over a period; the state (x, v) meets the constraints."""
+    """The map over a period; the state (x, v) meets the constraints. Raises as `fast_of` for its functions of time."""
     steps = max(1, round(period / method.step))
     steps = steps if steps < ROWS else -(-steps // ROWS) * ROWS
     shortened: Any = method
-    return _about(evaluator(system), time, x, v, replace(shortened, step=period / steps), period, steps)
+    step = period / steps
+    of = _about(evaluator(system), time, x, v, replace(shortened, step=step), period, steps)
+    return replace(of, fast=fast_of(system, time, time + 2 * period, period / of.rows, step))
 
 
 def turns_about(of: Turns, x: Array, v: Array) -> Turns:
     """The same map about another state near the chart's."""
-    return _about(of.near.at, of.near.time, x, v, of.method, of.period, of.steps)
+    return replace(_about(of.near.at, of.near.time, x, v, of.method, of.period, of.steps), fast=of.fast)
 
 
 def _about(at: Evaluator, time: float, x: Array, v: Array, method: Integrator, period: float, steps: int) -> Turns:
@@ -136,7 +147,7 @@ def _turned_most(place: Layout, y: Array) -> float:
 def engine_of(of: Turns, x: Array, v: Array) -> Engine:
     """Memory for steps of the map from a state (x, v)."""
     closed = gains(Projection(max(CLOSED * length_of(of.system.scene), ROUNDING)))
-    engine = new_engine(of.system, x, v, of.method, closed, start=of.near.time, spacing=of.method.step)
+    engine = new_engine(of.divided, x, v, of.method, closed, start=of.near.time, spacing=of.method.step)
     engine.work.loads.reference[:] = of.near.at.work.loads.reference
     return engine
 

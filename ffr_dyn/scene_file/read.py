@@ -43,6 +43,7 @@ from ffr_dyn.integrators import Integrator, Tolerances, Within, method_named, st
 from ffr_dyn.integrators.stabilisation import Baumgarte, Drifting, Projection, Stabilisation
 from ffr_dyn.scene.force_kinds import forces_of
 from ffr_dyn.scene.scene import GROUND, Body, Scene
+from ffr_dyn.scene_file.ambiguous import check_ambiguous, unreadable
 from ffr_dyn.scene_file.assignments import assigned
 from ffr_dyn.scene_file.parameters import Parameters, as_number, nearest, substituted
 from ffr_dyn.scene_file.schema import (
@@ -57,7 +58,7 @@ from ffr_dyn.scene_file.schema import (
     tables,
 )
 from ffr_dyn.scene_file.source import Source, origin, origin_of_name, read_source
-from ffr_dyn.scene_file.state_formula import StateFormula, check_names
+from ffr_dyn.scene_file.state_formula import StateFormula, check_names, quantities_of
 from ffr_prep.body import BodyError, FlexibleBody, damped, load_body, rigid_body, truncated, with_point
 from ffr_prep.common.errors import InputError
 from ffr_prep.common.reading import reading
@@ -149,9 +150,20 @@ def _explained(error: ValidationError, source: Source, tree: Mapping[str, Any]) 
         plain = isinstance(item["input"], (str, int, float, bool, list))
         value = f" (it is {item['input']!r})" if plain and item["type"] != "missing" else ""
         text = _with_nearest(item, where, complaint(item).removeprefix("it: "))
+        text = unreadable(item["input"], tree) or text if isinstance(item["input"], str) else text
+        text += _of_the_angle(where, text, tree)
         at = (*where, misspelt[1]) if (misspelt := re.match(r"'(.+?)' is not a known entry", text)) else where
         lines[f"{origin(source, at)}: {'.'.join(where) or 'file'}: {text}{value}"] = None
     return "; ".join(lines)
+
+
+def _of_the_angle(where: tuple[str, ...], text: str, tree: Mapping[str, Any]) -> str:
+    """That a unit does not fit as the coordinate of a joint is not given, which is its angle then; empty where it is."""
+    table, name, *_ = *where, "", ""
+    entry = tree.get(table, {}).get(name) if table in ("forces", "drivers") else None
+    if not isinstance(entry, dict) or "joint" not in entry or "coordinate" in entry or "does not fit" not in text:
+        return ""
+    return '; without a coordinate it is about the angle: write coordinate = "stroke" for one along the joint'
 
 
 def _likeliest(items: Sequence[Any]) -> list[Any]:
@@ -206,6 +218,7 @@ def _scene(entry: Any, source: Source, given: Mapping[str, str | Path | Flexible
                 check_names(scene, formula, f"force {force.name!r}")
     except InputError as error:
         raise InputError(f"{origin_of_name(source, str(error))}: {error}") from None
+    check_ambiguous(source, set(quantities_of(scene)))
     return scene
 
 

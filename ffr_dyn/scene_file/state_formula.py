@@ -62,7 +62,7 @@ class StateFormula:
 
 def check_names(scene: Scene, formula: StateFormula, what: str) -> None:
     """Raises InputError that names `what` for a quantity that the scene does not have."""
-    known = list(_names(scene))
+    known = list(quantities_of(scene))
     for expression in formula.expressions:
         for name in names_in(expression):
             if name not in known:
@@ -71,7 +71,7 @@ def check_names(scene: Scene, formula: StateFormula, what: str) -> None:
                 raise InputError(f"{what}: there is no quantity {name!r}; {hint}")
 
 
-def _names(scene: Scene) -> Iterator[str]:
+def quantities_of(scene: Scene) -> Iterator[str]:
     """Every quantity that a formula can name."""
     moving = [marker for marker in marker_names(scene) if not marker.startswith(f"{GROUND}.")]
     yield from (f"{marker}.{what}.{k}" for marker in moving for what in ("position", "velocity") for k in "xyz")
@@ -83,7 +83,7 @@ def _names(scene: Scene) -> Iterator[str]:
 
 
 def _read(state: StateView, name: str) -> float:
-    """The value of one of `_names`."""
+    """The value of one of `quantities_of`."""
     head, _, last = name.rpartition(".")
     if last in ("angle", "angle_rate", "stroke", "stroke_rate"):
         joint = next(joint for joint in state.scene.joints if joint.name == head)

@@ -242,7 +242,10 @@ def _read_table(file: Path) -> TimeFunction:
     rows = [_two_numbers(file, number, line) for number, line in enumerate(lines, 1) if line]
     if not rows:
         raise InputError(f"{file} has no numbers; it needs two columns, time and value")
-    return table(*np.array(rows).T)
+    try:
+        return table(*np.array(rows).T)
+    except InputError as error:
+        raise InputError(f"{file}: {error}") from None
 
 
 def _two_numbers(file: Path, number: int, line: str) -> tuple[float, float]:

@@ -21,6 +21,7 @@ from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 
 MOST = 10_000_000  # points of a study: some GB of a table
+DIGITS = 15  # of numbers between two others: those that are written
 
 Sampling = Literal["monte-carlo", "latin-hypercube", "sobol"]
 Value = float | str
@@ -116,7 +117,8 @@ def spaced(start: float, end: float, count: int, *, logarithmic: bool = False) -
     if logarithmic and not (start > 0 and end > 0):
         raise InputError(f"spacing by logarithms wants values above zero, not from {start:g} to {end:g}")
     values = np.geomspace(start, end, count) if logarithmic else np.linspace(start, end, count)
-    return Axis(tuple(values.tolist()))
+    between = [float(f"{value:.{DIGITS}g}") for value in values[1:-1]]  # 0.3, and not 0.30000000000000004
+    return Axis((*values[:1].tolist(), *between, *values[1:][-1:].tolist()))
 
 
 def points(

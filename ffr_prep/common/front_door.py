@@ -1,14 +1,17 @@
 """The front door of a package: its public names, each loaded when it is first used (PEP 562).
 
-What is called through it, and fails for an argument of another type than its annotation, says so by an InputError. The
-types are looked at after the failure only: what works is none of the door's business, and costs nothing. Flags are looked
-at before: any value is true or false, so that a wrong one, as check="no", never fails.
+What is called through it, and fails for an argument of another type than its annotation, or for one that is missing or that
+there is not, says so by an InputError. They are looked at after the failure only: what works is none of the door's business,
+and costs nothing. Flags are looked at before: any value is true or false, so that a wrong one, as check="no", never fails.
 """
 
 from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from contextlib import suppress
+from dataclasses import fields, is_dataclass
+from difflib import get_close_matches
 from functools import wraps
 from importlib import import_module
 from inspect import Parameter, isclass, isfunction, signature
@@ -40,8 +43,6 @@ def front_door(
         elif name in module_of:
             value = _guarded(getattr(import_module(module_of[name]), name), package)
         else:
-            from difflib import get_close_matches
-
             close = get_close_matches(name, public, 1)
             hint = f"did you mean {close[0]!r}?" if close else f"dir({package}) lists what there is"
             raise AttributeError(f"module {package!r} has no attribute {name!r}; {hint}", name=name)
@@ -82,7 +83,7 @@ def _explaining(function: Callable[..., Any], name: str) -> Callable[..., Any]:
         except (InputError, ComputationError):
             raise
         except Exception as error:
-            wrong = _misfit(function, args, named)
+            wrong = _unbound(function, args, named) or _misfit(function, args, named)
             if wrong is None:
                 raise
             raise InputError(f"{name}: {wrong}") from error
@@ -90,8 +91,52 @@ def _explaining(function: Callable[..., Any], name: str) -> Callable[..., Any]:
     return call
 
 
+def _unbound(function: Callable[..., Any], args: tuple[Any, ...], named: Mapping[str, Any]) -> str | None:
+    """What is missing, or is no argument of a function, in words; None where all can be given so."""
+    with suppress(TypeError):
+        signature(function).bind(*args, **named)
+        return None
+    every = signature(function).parameters.values()
+    kinds, several = {one.kind for one in every}, (Parameter.VAR_POSITIONAL, Parameter.VAR_KEYWORD)
+    places = [one.name for one in every if one.kind in (one.POSITIONAL_ONLY, one.POSITIONAL_OR_KEYWORD)]
+    names = [one.name for one in every if one.kind not in several and one.name != "self"]
+    unknown = [key for key in named if key not in names]
+    if unknown and Parameter.VAR_KEYWORD not in kinds:
+        return f"there is no argument {unknown[0]!r}; {_meant(function, unknown[0], names)}"
+    if len(args) > len(places) and Parameter.VAR_POSITIONAL not in kinds:
+        known, free = [name for name in places if name != "self"], [n for n in names if n not in {*places, *named}]
+        value, only = _shown(args[len(places)]), f", as only {_listed(known)} may be" if known else ""
+        return f"{value} is given without its name{only}" + (
+            f"; write {free[0]}={value} if that is meant" if free else ""
+        )
+    if twice := next((name for name in places[: len(args)] if name in named), None):
+        return f"{twice} is given twice, by its place and by its name"
+    given = {*places[: len(args)], *named}
+    missing = [one.name for one in every if one.name in names and one.default is one.empty and one.name not in given]
+    return (
+        f"{_listed(missing)} {'is' if len(missing) == 1 else 'are'} missing; give {missing[0]}=..." if missing else None
+    )
+
+
+def _meant(function: Callable[..., Any], key: str, names: list[str]) -> str:
+    """A hint at the argument that was meant, or at the settings among the arguments that have it."""
+    if close := get_close_matches(key, names, 1):
+        return f"did you mean {close[0]!r}?"
+    with suppress(NameError):
+        for name, hint in get_type_hints(function).items():
+            for one in get_args(hint) or (hint,):
+                if name in names and is_dataclass(one) and isclass(one) and key in {f.name for f in fields(one)}:
+                    return f"{one.__name__} has it: {name}={one.__name__}({key}=...)"
+    return f"there is {_listed(names)}" if len(names) < 2 else f"there are {_listed(names)}"
+
+
+def _listed(names: list[str]) -> str:
+    *others, last = names or ["none"]
+    return f"{', '.join(others)} and {last}" if others else last
+
+
 def _misfit(function: Callable[..., Any], args: tuple[Any, ...], named: Mapping[str, Any]) -> str | None:
-    """The first argument that is of another type than its annotation, in words; None where all fit, or some are missing."""
+    """The first argument that is of another type than its annotation, in words; None where all fit."""
     try:
         given, hints = signature(function).bind(*args, **named), get_type_hints(function)
     except (TypeError, NameError):

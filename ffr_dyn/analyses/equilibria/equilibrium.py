@@ -26,6 +26,7 @@ from scipy.linalg import LinAlgWarning, eigvalsh_tridiagonal, ldl, lu_factor, lu
 from ffr_dyn.analyses.equilibria.relaxation import Rest, relaxed
 from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.consistency.evaluation import locked, total_mass_matrix, unit_rows
+from ffr_dyn.equations.forces import At, applied_by
 from ffr_dyn.equations.forces_at_rest import is_load
 from ffr_dyn.equations.layout import moved
 from ffr_dyn.equations.statics import Balance, balance
@@ -264,15 +265,30 @@ class _Problem:
             raise
         except Exception as error:  # of a formula, or of a function of the user's
             raise ComputationError(
-                f"the forces are not finite near the equilibrium: {type(error).__name__}: {error}; look at the formulas and "
-                "functions of the scene"
+                f"the forces are not finite near the equilibrium{self._of_a_force(x)}: {type(error).__name__}: {error}; look "
+                "at its formulas and functions: one of time takes t alone, one of the motion (t, state) as `function`"
             ) from error
         if not (np.isfinite(now.forces).all() and np.isfinite(now.stiffness).all()):
-            raise ComputationError("the forces are not finite near the equilibrium; check loads and springs")
+            raise ComputationError(
+                f"the forces are not finite near the equilibrium{self._of_a_force(x)}; check its numbers, formulas and "
+                "functions"
+            )
         if not across.size:
             return now
         jacobian = np.concatenate([now.jacobian, unit_rows(across, place.v_size)])
         return replace(now, Phi=np.append(now.Phi, np.zeros(across.size)), jacobian=jacobian)
+
+    def _of_a_force(self, x: Array) -> str:
+        """The first force that has no finite value at positions x, in words; empty where there is none."""
+        still = np.zeros(self.system.layout.v_size)
+        for force in forces_of(self.system.scene):
+            try:
+                found = applied_by(At(self.system.scene, self.system.layout, self.time, x, still), force).generalised
+            except Exception:  # whatever a function of the user raises
+                found = np.full(1, np.nan)
+            if not np.isfinite(found).all():
+                return f", of {force.table[:-1]} {force.name!r}"
+        return ""
 
 
 def _from_rest(now: Balance, M: Array) -> tuple[Array, Array, Array]:

@@ -18,6 +18,7 @@ from ffr_dyn.analyses.registry import OfMoment, option
 from ffr_dyn.analyses.rotating.inputs import Acting, absolute_order, acting, components, excited, told
 from ffr_dyn.analyses.rotating.response import about_state, band_in_words
 from ffr_dyn.analyses.settings import MomentSettings
+from ffr_dyn.compile.scene_tables import given_at
 from ffr_dyn.consistency.assemble import assemble
 from ffr_dyn.consistency.evaluation import evaluator
 from ffr_dyn.functions.time_functions import harmonic
@@ -37,6 +38,7 @@ About = Literal["start", "equilibrium"]
 STEPS, ROWS = 400, 80  # of a period
 HARMONICS = 5
 GROWS = 1e-4  # of a multiplier beyond one: what differences leave
+LOOKS, STEADY = 257, 1e-9  # at functions of time, over two periods; of their size: what is no change
 
 
 @dataclass(frozen=True)
@@ -139,6 +141,7 @@ def forced(
     acts = acting(at, input, 0.0)
     units = components(at, outputs, 0.0, "forced")
     names = tuple(units)
+    _check_constant(at, 2 / min(band_of))
     of, notes = _wave(at, acts, amplitude, steps, band_of)
     still = returned(of.at(band_of[0], 0.0))
     *_, first = branch(over_amplitude(of, band_of[0]), begun(of, still.x, still.v))
@@ -162,6 +165,22 @@ def _check(amplitude: float, band: tuple[float, float], steps: int, harmonics: i
         )
     if about not in ("start", "equilibrium"):
         raise InputError(f"about is {about!r}; forced vibrates about the 'start' or the 'equilibrium'")
+
+
+def _check_constant(scene: Scene, lasts: float) -> None:
+    """InputError for a function of time that changes within some seconds, and so does not come back at every frequency."""
+    assembled, times = assemble(scene), np.linspace(0.0, lasts, LOOKS)
+    try:
+        first, *later = (given_at(assembled.system, t, assembled.x, assembled.v) for t in times)
+    except Exception:  # of a Python function, which the first period tells
+        return
+    for what, given in first.items():
+        of = np.array([given, *(one[what] for one in later)])
+        if (np.ptp(of, axis=0) > STEADY * np.abs(of).max(axis=0)).any():
+            raise InputError(
+                f"{what} changes with time by itself, which does not come back at every frequency of the input; make it "
+                "constant for forced, or take `periodic` at one frequency, or `forward`"
+            )
 
 
 def _wave(

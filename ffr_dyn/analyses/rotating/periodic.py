@@ -16,11 +16,14 @@ from ffr_dyn.analyses.integration import with_all_reactions
 from ffr_dyn.analyses.outcome import needed, result_of, with_quantities
 from ffr_dyn.analyses.registry import OfMoment, option
 from ffr_dyn.analyses.settings import MomentSettings
+from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.consistency.assemble import Assembled, assemble
 from ffr_dyn.consistency.doubts import checked
 from ffr_dyn.consistency.evaluation import evaluator, joined, record_states
+from ffr_dyn.consistency.following import sudden
 from ffr_dyn.consistency.step_error import OVER_BREAKS, PARTLY_STIFF, Beside, step_errors, untold_breaks, worst
 from ffr_dyn.consistency.tangent import sizes_of
+from ffr_dyn.equations.constraint_rows import drive_of
 from ffr_dyn.equations.layout import moved
 from ffr_dyn.integrators import ROS3, Integrator
 from ffr_dyn.kernels.tables import Record
@@ -30,6 +33,7 @@ from ffr_dyn.linear.words import in_words
 from ffr_dyn.results.quantities import selected
 from ffr_dyn.results.result import Result
 from ffr_dyn.scene.described import described
+from ffr_dyn.scene.joints import DRIVEN_ANGLE
 from ffr_dyn.scene.scene import Scene, require_scene
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError, InputError
@@ -39,6 +43,7 @@ FAR = 0.5  # of a multiplier, that other steps change it by: beyond it the chang
 GONE = 1e-4  # of a multiplier: below it differences of a period tell nothing of the shape
 SHOWN = 12  # modes that a command prints
 UNKNOWN = "the error of the steps is not known: others bring nothing back; give smaller ones (step, --step)"
+LOOKS, REPEATS = 257, 1e-4  # at a driven motion over a period, and of its range: what it may be off a period later
 CYCLES = 10  # periods that a film of one shows, at most
 
 
@@ -137,7 +142,7 @@ def periodic(
         "computed": assembled.computed,
         **(_multipliers(of, found) if floquet else {}),
         **told,
-        "notes": [*assembled.notes, *checked("static", assembled, record), *([UNKNOWN] if check and not told else [])],
+        "notes": [*assembled.notes, *_doubts(assembled, of, record), *([UNKNOWN] if check and not told else [])],
         "status": "complete",
     }
     return with_quantities(replace(result, attributes=attributes), {}, path)
@@ -153,7 +158,8 @@ def _errors(
     except ComputationError:
         return {}
     ratio, order = of.steps / other.steps, PARTLY_STIFF if isinstance(of.method, ROS3) else of.method.order
-    if untold_breaks(system, result.time):
+    found_before = of.fast.jumps[:, 1].tolist() if of.fast else ()
+    if untold_breaks(system, result.time, found_before):
         order = OVER_BREAKS if isinstance(of.method, ROS3) else 1
     beside = Beside(result_of(system, _record(assembled, of, again), {}, None, outputs), ratio)
     errors = step_errors(result, beside, order)
@@ -168,6 +174,13 @@ def _errors(
         far = apart > FAR * np.abs(one)  # steps that damp a mode to nothing have no order yet
         attributes["multiplier_errors"] = np.where(far, apart, apart / abs(ratio**order - 1)).tolist()
     return attributes
+
+
+def _doubts(assembled: Assembled, of: Turns, record: Record) -> list[str]:
+    """Notes on functions of time within steps, and on the rows of a period."""
+    words, breaks = (of.fast.words, of.fast.breaks) if of.fast else ((), np.zeros(0))
+    at_once = sudden(of.system, breaks, of.near.time, of.near.time + of.period)
+    return [*words, *checked("static", assembled, record), *at_once]
 
 
 def _record(assembled: Assembled, of: Turns, found: Returned) -> Record:
@@ -233,8 +246,31 @@ def _found(
         raise InputError(f"the period is {period} s; it must be positive and finite")
     length = period_of(assembled.system.scene, time) if period is None else period
     chosen = method if method is not None and not method.controlled else ROS3(length / STEPS)
+    _check_drivers(assembled.system, time, length)
     of = turns(assembled.system, time, assembled.x, assembled.v, chosen, length)
     return of, returned(of)
+
+
+def _check_drivers(system: System, time: float, period: float) -> None:
+    """ComputationError for a driven motion that is another one in the second period [s], but for whole turns.
+
+    Where nothing is free besides, there is no state to tell it.
+    """
+    times = time + period * np.linspace(0.0, 1.0, LOOKS)
+    said = [(block, word) for block in system.blocks for word in block.words if word.function is not None]
+    for block, word in said:
+        try:
+            first, second = (np.array([drive_of(word, float(t))[0] for t in times + later]) for later in (0.0, period))
+        except Exception:  # of a Python function, which the first period tells
+            continue
+        turn = 2 * np.pi if word.kind == DRIVEN_ANGLE else np.inf
+        apart = np.abs(second - first - (turn * round((second[0] - first[0]) / turn) if turn < np.inf else 0.0))
+        if apart.max() > REPEATS * max(np.ptp(first), np.ptp(second)):
+            raise ComputationError(
+                f"{'driver' if block.driver else 'joint'} {block.name!r} does not come back after {period:.6g} s: what it "
+                f"prescribes in the second period is up to {apart.max():.3g} off; give a period in which drivers and loads "
+                "all come back"
+            )
 
 
 def _multipliers(of: Turns, turn: Returned) -> dict[str, Any]:

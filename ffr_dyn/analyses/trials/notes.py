@@ -13,6 +13,7 @@ import numpy as np
 from ffr_dyn.analyses.trials.begin import Beginning
 from ffr_dyn.analyses.trials.errors import Trial, twin_share
 from ffr_dyn.analyses.trials.runs import Runs, has_failed
+from ffr_dyn.analyses.trials.set_in import not_led
 from ffr_dyn.consistency.step_error import (
     A_FORMULA,
     PLACES,
@@ -40,7 +41,8 @@ SHORTEST, LONGEST = 8, 64  # steps to a row, by which what it seems to show is l
 
 def finished(runs: Runs, trial: Trial, path: str | Path | None, ringing: Set[str] = frozenset()) -> Result:
     """The result of a run with its errors, here and in its file; `ringing` outputs are told to be so."""
-    result, grown = trial.result, from_rounding(trial.result)
+    result, begun = trial.result, runs.assembled
+    grown = not_led(result, begun.system, begun.x, begun.v, from_rounding(result))
     unseen = _unseen(trial)
     notes = [
         *result.attributes["notes"],

@@ -159,6 +159,10 @@ class Force(ABC):
         """What it does not do in the scene, and may be meant to, in sentences."""
         return ()
 
+    def at_rest(self, rate: float) -> str | None:
+        """What it does otherwise than what it stands for where its coordinate hardly moves, in a sentence."""
+        return None
+
     def beyond(self, turned: float) -> str | None:
         """What is wrong with it, in a sentence, where the axes of its markers are turned by so much [rad] at most."""
         return None

@@ -12,6 +12,7 @@ from ffr_dyn.scene.fields import COULOMB, DAMPING, RATE, In, OfTime
 from ffr_dyn.scene.force_kinds import register_force
 from ffr_dyn.scene.forces.checks import check_function, check_number, check_positive
 from ffr_dyn.scene.forces.force import Force, LawNumbers, LoadTable, Moment
+from ffr_dyn.scene.forces.given import is_number
 from ffr_dyn.scene.forces.places import OnJoint
 from ffr_prep.common.errors import InputError
 
@@ -80,6 +81,19 @@ class JointFriction(Force):
         if self.static is not None and self.stribeck is not None:
             size += (self.static - self.coulomb) * float(np.exp(-((rate / self.stribeck) ** 2)))
         return max(now.value(self.normal)[0], 0.0) * size  # below zero it is lifted off
+
+    def at_rest(self, rate: float) -> str | None:
+        if not self.coulomb > 0 or abs(rate) > self.creep:
+            return None
+        units = ("m/s", "N", "N s/m") if self.coordinate == "stroke" else ("rad/s", "N m", "N m s/rad")
+        holds, damps = "a load", "steeply"
+        if is_number(self.normal):
+            most = self.normal * (self.coulomb if self.static is None else self.static)
+            holds, damps = f"{most:.4g} {units[1]}", f"by {most / self.creep:.4g} {units[2]}"
+        return (
+            f"force {self.name!r} is dry friction made smooth: at rest it does not hold {holds}, but damps {damps} below "
+            f"{self.creep:.3g} {units[0]}; where it is to stick, put a stiff spring or a driver in its place"
+        )
 
     @property
     def damps_unevenly(self) -> bool:

@@ -529,6 +529,27 @@ def test_an_inverted_rod_is_carried_by_leaning_first():
     assert abs(found["hinge.angle"][-1] - np.pi / 2) < 0.05
 
 
+PULSES = [
+    pytest.param("1e3 * step(t - 0.1417) - 1e3 * step(t - 0.1418)", 0.1, marks=pytest.mark.slow),
+    pytest.param("1e4 * exp(-((t - 0.1417) / 1e-5)**2)", 0.1 * np.sqrt(np.pi), marks=pytest.mark.slow),
+]
+
+
+@pytest.mark.parametrize(("pulse", "impulse"), PULSES)
+def test_a_pulse_between_two_rows_turns_what_is_free(pulse, impulse):
+    """By its impulse over the inertia about the hinge, 1/3 kg m^2; a causal solution stepped over it."""
+    scene = cart_with_rod(0.0, -np.pi / 2, Load("knock", "rod.o", moment=(0, 0, formula(pulse))))
+    found = mixed(scene, unknown=(PUSH,), end=0.2, output_step=0.2, solution=Causal(tolerance=1e-7))
+    assert found["rod.omega_bar"][-1, 2] == pytest.approx(3 * impulse, rel=1e-5)
+
+
+def test_a_pulse_between_two_places_of_a_bounded_solution_is_told():
+    knock = Load("knock", "rod.o", moment=(0, 0, formula("10 * exp(-((t - 0.1417) / 1e-4)**2)")))
+    notes = bounded(cart_with_rod(0.1, np.pi / 2, knock, gravity=(0, -9.81, 0)), 0.05).attributes["notes"]
+    (note,) = (one for one in notes if "load 'knock': changes within" in one)
+    assert note.endswith("take more `parts` of an output step")
+
+
 def true_cart_with_rod(height: float, times: np.ndarray) -> np.ndarray:
     """(T, 2) angle from the upright, (to the left) and force on the cart: another solver of its equation; it must neither
     fall nor swing at both ends."""

@@ -124,8 +124,11 @@ def test_forces_that_are_not_finite_are_named():
     """A formula that has no value at the time of the equilibrium."""
     scene = hanging(0.0, Load("wind", "rod.b", (formula("1 / t"), 0, 0)))
     assert static(scene, time=1.0).attributes["stable"]
-    with pytest.raises(ComputationError, match="forces are not finite near the equilibrium"):
+    with pytest.raises(ComputationError, match="forces are not finite near the equilibrium, of load 'wind'"):
         static(scene, time=0.0)
+    for push in (lambda t: np.nan, lambda t, state: 1.0):
+        with pytest.raises(ComputationError, match="not finite near the equilibrium, of load 'wind'"):
+            static(hanging(0.0, Load("wind", "rod.b", (push, 0, 0))))
 
 
 @pytest.fixture(scope="module")

@@ -138,6 +138,26 @@ def test_a_small_body_on_a_long_way_is_a_linear_oscillator():
 
 
 @pytest.mark.slow
+def moved_by_itself(force: object) -> fd.Scene:
+    push = fd.Actuator("push", "rail", force, coordinate="stroke")
+    return replace(duffing(), forces=(*duffing().forces, push))
+
+
+@pytest.mark.parametrize("force", [fd.harmonic(amplitude=3.0, frequency=1.0), lambda t: np.sin(2 * np.pi * t)])
+def test_what_changes_by_itself_is_refused(force):
+    """What came back at the first frequency of the band was in all rows, as ten times the amplitude."""
+    with pytest.raises(fd.InputError, match="force 'push' changes with time by itself"):
+        fd.forced(
+            moved_by_itself(force), input="rail.force", amplitude=0.1, outputs=["m.R.x"], band_of=(1.0, 1.2), steps=80
+        )
+
+
+def test_what_changes_later_than_two_periods_is_not():
+    scene = moved_by_itself(fd.formula("0.1 * step(t - 50)"))
+    found = fd.forced(scene, input="rail.force", amplitude=0.1, outputs=["m.R.x"], band_of=(1.0, 1.01), steps=80)
+    assert found["amplitude"].max() > 0
+
+
 def test_a_pendulum_swings_by_more_than_a_radian():
     """(I + m l^2) x'' + c x' + m g l sin x = T sin(w t): each motion, stable or not, repeats itself by SciPy's solver."""
     bob = fd.rigid_body("bob", mass=1.0, inertia=(1e-3, 1e-3, 1e-3), points={"hub": (0, 0.3, 0)})

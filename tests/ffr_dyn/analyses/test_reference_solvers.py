@@ -13,6 +13,7 @@ from test_analyses_references import END, andrews
 
 from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.analyses.reference import IDA, SciPy, reference
+from ffr_dyn.functions.formula import formula
 from ffr_dyn.functions.time_functions import polynomial
 from ffr_dyn.integrators import RK4
 from ffr_dyn.integrators.stabilisation import Projection
@@ -151,3 +152,43 @@ def test_andrews(method, apart):
     result = reference(andrews(), end=0.03, output_step=1e-3, method=method)
     for name, expected in END.items():
         assert abs(result[f"{name}.angle"][-1] - expected) < apart, name
+
+
+PULSES = {
+    "smooth": (formula("1e4 * exp(-((t - 0.0533) / 1e-5)**2)"), 0.1 * np.sqrt(np.pi)),
+    "box": (formula("100 * step(t - 0.0533) - 100 * step(t - 0.0534)"), 1e-2),
+    "python": (lambda t: 100.0 if 0.0533 <= t < 0.0534 else 0.0, 1e-2),
+}
+
+
+@pytest.mark.parametrize(
+    ("method", "pulse"),
+    [
+        *(("DOP853", one) for one in PULSES),
+        *(("LSODA", one) for one in PULSES),
+        ("IDA", "box"),
+        pytest.param("IDA", "smooth", marks=pytest.mark.slow),
+    ],
+)
+def test_a_pulse_between_two_steps_of_a_solver_is_seen(method, pulse):
+    """By its impulse; the solvers stepped over it, and the body was left at rest."""
+    function, impulse = PULSES[pulse]
+    rail = Joint("rail", "translational", "ground.O", "one.a", axis=(1, 0, 0))
+    push = Load("push", "one.a", force=(function, 0, 0))
+    scene = Scene((bar("one"),), (rail,), loads=(push,), ground={"O": (0, 0, 0)})
+    found = reference(scene, end=0.2, output_step=0.02, method=METHODS[method][0])
+    assert found["one.v"][-1, 0] == pytest.approx(impulse, rel=2e-7)
+
+
+@pytest.mark.parametrize("method", ["DOP853", pytest.param("IDA", marks=pytest.mark.slow)])
+def test_a_driver_whose_rate_jumps_is_told_and_jumps_where_it_does(method):
+    """What hangs on it swings as with a row there; it went on at the old rate until the next row."""
+    rail = Joint("rail", "translational", "ground.O", "one.a", axis=(1, 0, 0))
+    hinge = Joint("hinge", "revolute", "one.b", "two.a")
+    driver = Driver("cam", "rail", formula("max(0, t - 0.05)"), coordinate="stroke")
+    hung = bar("two", position=(1, 0, 0), rotation=(0, 0, -np.pi / 2))
+    scene = Scene((bar("one"), hung), (rail, hinge), drivers=(driver,), ground={"O": (0, 0, 0)}, gravity=GRAVITY)
+    between, at = (reference(scene, end=0.2, output_step=h, method=METHODS[method][0]) for h in (0.04, 0.05))
+    np.testing.assert_allclose(between["two.b.velocity"][-1], at["two.b.velocity"][-1], rtol=0, atol=1e-5)
+    (note,) = (note for note in between.attributes["notes"] if "at once" in note)
+    assert "driver 'cam' changes its rate by 1 m/s at once at t = 0.05 s" in note

@@ -152,6 +152,11 @@ SHAKEN = replace(
 )
 
 
+def spun(speed: float) -> Scene:
+    """A bar that nothing drives, on its hinge."""
+    return replace(HINGED, gravity=(0, 0, 0), bodies=(replace(HINGED.bodies[0], omega_bar=(0, 0, speed)),))
+
+
 def deviated(share: float) -> object:
     """The state of a double pendulum at a share of the scene's size from where it hangs."""
     at = assemble(DOUBLE)
@@ -910,6 +915,7 @@ INPUT = [
             ({"band_of": (0.0, 1.0)}, {"band_of": (1.0, 1.01)}),
             ({"steps": 10}, {"steps": 80}),
             ({"about": "steady"}, {"about": "start"}),
+            ({"scene": replace(SPRUNG, gravity=(fd.harmonic(amplitude=1, frequency=1), 0, 0))}, {"scene": SPRUNG}),
             ({"outputs": []}, {"outputs": ["hinge.angle"]}),
             ({"input": "none", "scene": IDLE}, {"input": "hinge.moment", "scene": IDLE}),
             ({"input": "looking", "scene": IDLE}, {"input": "hinge.moment", "scene": IDLE}),
@@ -935,6 +941,7 @@ INPUT = [
     Case(lambda: fd.periodic(HINGED), lambda: fd.periodic(EVENLY)),
     Case(lambda: fd.periodic(EVENLY, period=-1.0), lambda: fd.periodic(EVENLY)),
     Case(lambda: fd.periodic(EVENLY, period=0.3), lambda: fd.periodic(EVENLY)),
+    Case(lambda: fd.periodic(spun(10.0), period=0.3), lambda: fd.periodic(spun(20 * np.pi), period=0.3)),
     Case(lambda: fd.Steady(speeds=("inf",)).perform(EVENLY, MOMENT), lambda: fd.steady(EVENLY)),
     Case(lambda: fd.steady(DRAGGED), lambda: fd.steady(TURNING)),
     Case(lambda: fd.steady(governor(1000.0)), lambda: fd.steady(governor(1.0))),

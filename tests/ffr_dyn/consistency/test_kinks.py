@@ -84,6 +84,41 @@ def test_beside_it_nothing_is_told(name):
     assert not [note for note in fd.linearise(BESIDE[name]).notes if "kink" in note]
 
 
+DRY = {"coulomb": 4.0, "static": 5.0, "stribeck": 0.1, "creep": 1e-3, "coordinate": "stroke"}
+
+
+@pytest.mark.parametrize(
+    ("friction", "speed", "words"),
+    [
+        (DRY, 0.0, "does not hold 5 N, but damps by 5000 N s/m below 0.001 m/s"),
+        (DRY | {"normal": lambda t: 2.0}, 0.0, "does not hold a load, but damps steeply below 0.001 m/s"),
+        (DRY, 2e-3, None),
+        (DRY | {"coulomb": 0.0, "static": 0.0}, 0.0, None),
+    ],
+)
+def test_dry_friction_that_is_to_stick_is_told(friction, speed, words):
+    """Smooth, it is a damper at rest: 0 Hz, and -2500 1/s, were told of a cart that rests on rough ground."""
+    at = scene(fd.JointFriction("it", "guide", **friction), speed=speed)
+    for notes in (fd.linearise(at).notes, *([] if speed else [fd.static(at).attributes["notes"]])):
+        told = [note for note in notes if "force 'it' is dry friction" in note]
+        assert len(told) == (words is not None)
+        assert all(words in note for note in told)
+
+
+def test_a_block_on_an_incline_that_friction_is_to_hold_is_told_why_nothing_does():
+    slope = fd.Scene(
+        (fd.Body("cart", CART),),
+        (fd.Joint("guide", "translational", "ground.o", "cart.p", axis=(1, 0, 0)),),
+        forces=(fd.JointFriction("it", "guide", coulomb=12.0, creep=1e-3, coordinate="stroke"),),
+        gravity=(3.0, -9.0, 0.0),
+        ground={"o": (0, 0, 0)},
+    )
+    with pytest.raises(
+        fd.InputError, match=r"nothing holds the motion guide\.stroke.*'it' is dry friction made smooth"
+    ):
+        fd.static(slope)
+
+
 def test_a_stop_that_is_just_touched_adds_no_stiffness_yet():
     """Its force begins with the square of the depth; beside no damping, the mean of slopes over a micrometre is 2500 N/m."""
     found = fd.linearise(scene(stop(1e-6)))

@@ -23,11 +23,11 @@ from ffr_dyn.consistency.step_error import (
     untold_breaks,
 )
 from ffr_dyn.functions.formula import formula
-from ffr_dyn.functions.time_functions import harmonic, piecewise, user
+from ffr_dyn.functions.time_functions import evaluate, harmonic, piecewise, user
 from ffr_dyn.integrators import RK4, ROS2, ROS3, AdaptiveROS3
 from ffr_dyn.integrators.tolerances import tolerances
 from ffr_dyn.results.result import Quantity, Result
-from ffr_dyn.scene.forces import JointFriction, JointSpring, JointStop, Load
+from ffr_dyn.scene.forces import Actuator, JointFriction, JointSpring, JointStop, Load
 from ffr_dyn.scene.joints import Joint
 from ffr_dyn.scene.scene import Body, Scene
 from ffr_prep.body import rigid_body
@@ -288,6 +288,50 @@ def test_a_pendulum_that_stands_on_its_head_falls_by_chance(plane):
     assert by_chance["errors"]["j.angle"][1] >= 1.0
     assert not any("grows from rounding" in note for note in known["notes"])
     assert known["errors"]["j.angle"][1] < 1e-3
+
+
+SOFT = ["100 * exp(-((t - 0.3) / 0.05)**2)", "100 / (1 + exp((0.5 - t) / 0.02))"]
+
+
+@pytest.mark.parametrize(
+    ("text", "of_motion"),
+    [("1e-12 * exp(30 * t)", False), *(pytest.param(one, of, marks=pytest.mark.slow) for one in SOFT for of in (0, 1))],
+)
+def test_what_a_pulse_pushes_that_sets_in_softly_is_not_unstable(text, of_motion):
+    """Its error was told as all of its range. m c'' = -k c + F(t) by Duhamel's integral."""
+    push = formula(text)
+    given = {"function": lambda t, state: evaluate(push, t)[0]} if of_motion else {"force": push}
+    scene = sprung(Actuator("push", "rail", coordinate="stroke", **given))
+    told = forward(scene, end=1.0, output_step=0.01)
+    assert not any("grows from rounding" in note for note in told.attributes["notes"])
+    w, s = np.sqrt(500.0), np.linspace(0.0, 1.0, 20001)
+    force = np.array([evaluate(push, t)[0] for t in s])
+    exact = np.trapezoid(np.sin(w * (1.0 - s)) * force, s) / (2.0 * w)
+    off = abs(told["rail.stroke"][-1] - exact)
+    assert off <= 3 * told.attributes["errors"]["rail.stroke"][0] < 1e-2 * np.abs(told["rail.stroke"]).max()
+
+
+def sprung(*forces):
+    block = rigid_body("block", mass=2.0, inertia=[1, 1, 1], points={"o": (0, 0, 0)})
+    rail = Joint("rail", "translational", "ground.O", "block.o")
+    spring = JointSpring("spring", "rail", 1000.0, coordinate="stroke")
+    return Scene((Body("block", block),), (rail,), forces=(spring, *forces), ground={"O": (0, 0, 0)})
+
+
+def test_what_falls_by_chance_is_told_beside_a_pulse():
+    """A pendulum that stands on its head, and a block that a pulse pushes, which does not act on it."""
+    body = rigid_body("a", mass=2.0, inertia=[0.1, 0.2, 0.25], centre_of_mass=(0, -0.3, 0), points={"o": (0, 0, 0)})
+    pulsed = sprung(Actuator("push", "rail", formula("100 * exp(-((t - 3) / 0.5)**2)"), coordinate="stroke"))
+    scene = replace(
+        pulsed,
+        bodies=(*pulsed.bodies, Body("a", body, rotation=(0, 0, np.pi))),
+        joints=(*pulsed.joints, Joint("j", "revolute", "ground.O", "a.o")),
+        gravity=(0, -9.81, 0),
+    )
+    told = forward(scene, end=12.0, output_step=0.02).attributes
+    assert any("grows from rounding" in note for note in told["notes"])
+    assert told["errors"]["j.angle"][1] >= 1.0
+    assert told["errors"]["rail.stroke"][1] < 1e-2
 
 
 def test_work_that_is_added_up_too_seldom_is_told():

@@ -69,6 +69,19 @@ def test_a_run_over_a_pole_is_refused(text):
         forward(pushed(text), end=0.1, output_step=0.01, method=ROS2(1e-3), check=False)
 
 
+@pytest.mark.parametrize(("text", "at"), [("1 / t", "0"), ("2 / t**2", "0"), ("3 / (t - 0.1)", "0.1")])
+def test_a_run_that_begins_or_ends_at_a_pole_is_refused(text, at):
+    """1 / t took a cart of 1 kg to 1e23 m/s, and no error was told."""
+    with pytest.raises(InputError, match=rf"load 'push': the function of time grows without bound at t = {at} s"):
+        forward(pushed(text), end=0.1, output_step=0.01, method=ROS2(1e-3), check=False)
+
+
+@pytest.mark.parametrize(("text", "speed"), [("sin(t) / t", 0.0999444610), ("1.5 * sqrt(t)", 0.1**1.5)])
+def test_a_run_that_begins_where_a_function_is_only_steep_is_not(text, speed):
+    result = forward(pushed(text), end=0.1, output_step=0.01, method=ROS2(1e-4), check=False)
+    assert result["cart.a.velocity"][-1, 0] == pytest.approx(speed, rel=1e-4)
+
+
 def test_a_run_that_ends_before_a_pole_is_not():
     result = forward(pushed("1 / (0.2 - t)"), end=0.1, output_step=0.01, method=ROS2(1e-4), check=False)
     assert result["cart.a.velocity"][-1, 0] == pytest.approx(np.log(2.0), rel=1e-5)

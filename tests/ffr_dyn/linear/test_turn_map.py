@@ -52,6 +52,67 @@ def test_the_forced_oscillation_of_a_linear_oscillator(damping, inertia):
     np.testing.assert_allclose(np.stack([wave.real, wave.imag], 1) @ fit[0], x, atol=1e-9)
 
 
+def pulsed(width: float) -> tuple[fd.Scene, np.ndarray]:
+    """An oscillator under a pulse in every second, and its velocity over the period by Fourier's series."""
+    text, count = f"100 * exp(-(sin(pi * (t - 0.305)) / {width})**2)", 2**20
+    push = fd.Load("push", "m.c", force=(fd.formula(text), 0, 0))
+    pulse = 100 * np.exp(-((np.sin(np.pi * (np.arange(count) / count - 0.305)) / width) ** 2))
+    omega = 2j * np.pi * np.arange(count // 2 + 1)
+    velocity = np.fft.irfft(np.fft.rfft(pulse) * omega / (50.0 + 0.4 * omega + 2 * omega**2), count)
+    return replace(oscillator(), loads=(push,)), velocity
+
+
+@pytest.mark.parametrize("width", [pytest.param(1e-2, marks=pytest.mark.slow), 1e-5])
+def test_pulses_between_the_steps_of_a_period_are_seen(width):
+    """Of 3 us, in steps of 0.25 ms, there was no motion at all, and no word."""
+    scene, velocity = pulsed(width)
+    found = fd.periodic(scene, period=1.0)
+    exact = np.interp(found.time, np.arange(velocity.size) / velocity.size, velocity, period=1.0)
+    off, told = np.abs(found["m.v"][:, 0] - exact).max(), found.attributes["errors"]["m.v"][0]
+    assert off <= 3 * told + 1e-7 * np.ptp(velocity)
+    assert told < 1e-3 * np.ptp(velocity)
+
+
+def test_a_jump_of_the_rate_of_a_driver_within_a_period_is_told():
+    cam = fd.Driver("cam", "rail", fd.formula("0.1 * abs(sin(pi * (t - 0.3)))"), coordinate="stroke")
+    scene = replace(oscillator(), loads=(), drivers=(cam,))
+    notes = fd.periodic(scene, period=1.0, check=False).attributes["notes"]
+    assert any("driver 'cam' changes its rate by 0.6283 m/s at once at t = 0.3 s" in note for note in notes)
+
+
+@pytest.mark.parametrize(
+    ("function", "period", "off"),
+    [
+        (fd.table([0.0, 0.5, 1.0], [0.0, 0.2, 1.0]), 2.0, "off"),
+        (fd.formula("0.3 * sin(2 * pi * t)"), 1.5, "0.6 off"),
+        (fd.formula("0.3 * sin(2 * pi * t)"), 2.0, ""),
+        (fd.formula("0.3"), 2.0, ""),
+    ],
+)
+def test_a_driven_motion_that_does_not_come_back_is_an_error_with_nothing_free_too(function, period, off):
+    """Of a table that ends, the second period, in which all rests, was told as the motion."""
+    held = fd.Driver("cam", "rail", function, coordinate="stroke")
+    scene = replace(oscillator(), loads=(), drivers=(held,))
+    if off:
+        with pytest.raises(fd.ComputationError, match=f"driver 'cam' does not come back after {period:g} s: .* {off}"):
+            fd.periodic(scene, period=period, check=False)
+        return
+    found = fd.periodic(scene, period=period, check=False)
+    np.testing.assert_allclose(found["rail.stroke"], [evaluate(function, t)[0] for t in found.time], atol=1e-9)
+
+
+def test_a_driven_angle_comes_back_by_whole_turns():
+    turning = fd.Scene(
+        (fd.Body("rod", bar("rod", 2.0)),),
+        (fd.Joint("hinge", "revolute", "ground.O", "rod.a"),),
+        drivers=(fd.Driver("motor", "hinge", fd.polynomial(0.1, 5.0)),),
+        ground={"O": (0, 0, 0)},
+    )
+    assert fd.periodic(turning, check=False).attributes["period"] == pytest.approx(0.4 * np.pi)
+    with pytest.raises(fd.ComputationError, match="driver 'motor' does not come back after 1 s"):
+        fd.periodic(turning, period=1.0, check=False)
+
+
 def test_multipliers_of_mathieus_equation():
     """A pendulum whose hinge shakes: theta'' + (g + a w^2 cos w t)/l theta = 0 about its rest, l = 2 L / 3."""
     w, amplitude = 8.0, 0.4
@@ -193,7 +254,7 @@ def test_a_period_that_is_none_is_an_error():
         fd.periodic(oscillator())
     with pytest.raises(fd.InputError, match="positive and finite"):
         fd.periodic(oscillator(), period=-1.0)
-    with pytest.raises(fd.ComputationError, match="not where it began"):
+    with pytest.raises(fd.ComputationError, match=r"driver 'motor' does not come back after 0\.013 s"):
         fd.periodic(flexible_crank(), period=0.013)
     with pytest.raises(fd.ComputationError, match="does not repeat itself"):
         fd.periodic(flexible_crank())

@@ -213,6 +213,8 @@ OWN = [
     own((kernel_of, undeclared), (kernel_of, force_kernel(declared))),
     own((kernel_of, force_kernel(undeclared)), (kernel_of, force_kernel(declared))),
     Case(p(written, "push", MOTOR), p(written, MOTOR, "push")),
+    Case(p(fd.table, [0.0], [1.0]), p(fd.table, [0.0, 1.0], [1.0, 1.0])),
+    Case(p(fd.table, [0.0, 2.0, 1.0], [1.0, 2.0, 3.0]), p(fd.table, [0.0, 1.0, 2.0], [1.0, 3.0, 2.0])),
     Case(p(fd.piecewise, [0.0, 1.0], [1.0, 2.0]), p(fd.piecewise, [0.0, 1.0], [[1.0, 2.0]])),
 ]
 CASES = SCENES + PARTS + OWN

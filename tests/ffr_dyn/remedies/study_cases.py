@@ -96,6 +96,17 @@ def loaded(**bodies: str) -> object:
     return inside(fd.load_scene, "bar.toml", bodies=bodies)
 
 
+def pushed(force: str, joint: str = "hinge") -> object:
+    """A scene with a formula of the motion and a parameter of the name of an angle."""
+
+    def load() -> object:
+        scene = SCENE.replace("idle = 3.0", "hinge.angle = 3.0").replace("joints.hinge]", f"joints.{joint}]")
+        Path("pushed.toml").write_text(f'{scene}[loads.push]\nmarker = "bar.a"\nforce = ["{force}", 0, 0]\n')
+        return fd.load_scene("pushed.toml")
+
+    return inside(load)
+
+
 def opened(count: int) -> object:
     with crew(count) as found:
         return found
@@ -170,6 +181,8 @@ CASES = [
     Case(asked({"length": {"beta": ["1 m", 2, "1 m", "1 m"]}}, samples=2),
          asked({"length": {"beta": [1, 2, "1 m", "1 m"]}}, samples=2)),
     Case(p(inside, fd.load_study, "bar.toml"), p(inside, fd.load_scene, "bar.toml")),
+    Case(p(pushed, "-2 * hinge.angle"), p(pushed, "-2 * hinge.angle_rate")),
+    Case(p(pushed, "-2 * g-a.angle", "g-a"), p(pushed, "-2 * g_a.angle", "g_a")),
     Case(asked({"bodies": {"bar": {"mass": [1]}}, "bodies.bar.mass": [1]}), asked({"bodies.bar.mass": [1]})),
     Case(p(read, study=True, by=fd.load_result), p(read, study=False, by=fd.load_result)),
     Case(p(_check, Full("writing t.nc.runs/run-000001.nc failed")), p(_check, [])),

@@ -557,6 +557,24 @@ def test_an_actuator_accelerates_a_rotor(force, motion):
     np.testing.assert_allclose(result["hinge.angle"], motion(result.time) / INERTIA, atol=1e-9)
 
 
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        (
+            {"force": lambda t, state: 1.0},
+            r"force 'f' at t = 0 s: .*; it is called with t alone: a function of \(t, state\)",
+        ),
+        (
+            {"function": lambda t: 1.0},
+            r"force 'f' at t = 0 s: .*; it is called with \(t, state\): a function of t alone",
+        ),
+    ],
+)
+def test_a_function_of_other_arguments_is_told_with_what_it_is_called(given, words):
+    with pytest.raises(ComputationError, match=words):
+        integrate(rotor(Actuator("f", "hinge", **given)), end=0.1, output_step=0.1, method=RK4(1e-2))
+
+
 def test_a_python_actuator_sees_the_state():
     """A spring made by hand swings as one that is built in."""
     by_hand = Actuator(

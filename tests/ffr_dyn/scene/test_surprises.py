@@ -96,5 +96,5 @@ def test_surprises_are_answered_when_written(case):
     ],
 )
 def test_what_cannot_be_guessed_is_given_by_name_only(write):
-    with pytest.raises(TypeError, match="positional argument"):
+    with pytest.raises(fd.InputError, match="is given without its name"):
         write()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import sys
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 
@@ -232,6 +233,55 @@ def test_a_force_may_be_a_formula_of_the_motion(tmp_path):
         load_scene(written(tmp_path, text))
 
 
+PUSH = "10 * smooth(t / 0.05) * bar.length"
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"speed =": "hinge.angle = 3\nspeed =", PUSH: "-2 * hinge.angle"}, "'hinge.angle' is a parameter, and what moves"),
+        ({"speed =": "bar.q = 3\nspeed =", PUSH: "-2 * bar.q"}, None),
+        ({"speed =": "hinge.angle = 3\nspeed =", PUSH: "-2 * hinge.angle_rate"}, None),
+        ({"hinge]": "hinge-1]", PUSH: "-2 * hinge-1.angle"}, "formulas cannot hold the name 'hinge-1': .* call it 'hinge_1'"),
+        ({"hinge]": "hinge-a]", "[ground]": "[ground]\n", PUSH: "bar.length - hinge-a.angle"}, "the name 'hinge-a'"),
+        ({"b = [": "b-1 = [", '"bar.b"': '"bar.b-1"', PUSH: "-2 * bar.b-1.position.x"}, "cannot hold the name 'b-1'"),
+        ({"hinge]": "2]", PUSH: "-3 * 2.angle"}, "cannot hold the name '2': .* call it '_2'"),
+    ],
+)  # fmt: skip
+def test_names_in_formulas_of_the_motion_mean_one_thing(tmp_path, changes, words):
+    """A parameter `hinge.angle` was taken for the angle without a word, and of `rod-1.a` the unit 'a' was not known."""
+    text = SCENE
+    for old, new in changes.items():
+        text = text.replace(old, new)
+    said = pytest.raises(InputError, match=rf"scene\.toml, line \d+: loads\.push\.force\.1: .*{words}")
+    with said if words else nullcontext():
+        load_scene(written(tmp_path, text))
+
+
+@pytest.mark.parametrize(
+    ("given", "hint"),
+    [('creep = "1 mm/s"', True), ('coordinate = "angle"\ncreep = "1 mm/s"', False), ('creep = "1 kg"', True)],
+)
+def test_a_unit_of_a_stroke_asks_for_the_coordinate(tmp_path, given, hint):
+    force = f'[forces.dry]\nkind = "joint-friction"\njoint = "hinge"\ncoulomb = 3\n{given}\n'
+    with pytest.raises(InputError, match=r"forces\.dry\.creep: .* does not fit: this is given in rad/s") as caught:
+        load_scene(written(tmp_path, SCENE + force))
+    assert ('write coordinate = "stroke"' in str(caught.value)) == hint
+
+
+@pytest.mark.parametrize(
+    ("rows", "words"),
+    [
+        ("0, 5\n2, 3\n1, 2\n", r"rows\.csv: the times of a table must increase; after 2 s comes 1 s, in row 3"),
+        ("0, 5\n", r"rows\.csv: a table needs two or more times and as many values, not 1 and 1"),
+    ],
+)
+def test_a_file_of_rows_that_are_no_table_is_named(tmp_path, rows, words):
+    (tmp_path / "rows.csv").write_text(rows)
+    with pytest.raises(InputError, match=words):
+        load_scene(written(tmp_path, changed('"10 * smooth(t / 0.05) * bar.length"', '{table_file = "rows.csv"}')))
+
+
 def test_an_actuator_may_be_a_formula_of_the_motion(tmp_path):
     """A damper at the hinge by formula, and the same as a joint spring without stiffness."""
     kinds = (
@@ -317,7 +367,7 @@ MOTOR = '[drivers.m]\njoint = "hinge"\nfunction = '
         ('"30 rpm"', '"30 * lenght"', []),
         ("speed =", "sin =", ["parameters.sin", "taken"]),
         ("speed =", '"a b" =', ["parameters.a b", "cannot be a parameter's name"]),
-        ("[drivers]", MOTOR + '{table = [[0, 2, 1], [0, 1, 2]]}', ["drivers.m.function", "increasing"]),
+        ("[drivers]", MOTOR + '{table = [[0, 2, 1], [0, 1, 2]]}', ["drivers.m.function", "must increase; after 2 s comes 1 s"]),
         ("[drivers]", MOTOR + '{table = [[0, 1]]}', ["drivers.m", "table"]),
         ("[drivers]", MOTOR + '{polynomial = [1], formula = "t"}', ["exactly one of"]),
         ("[drivers]", MOTOR + '{table_file = "none.csv"}', ["none.csv does not exist"]),

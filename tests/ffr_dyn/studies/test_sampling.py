@@ -24,6 +24,9 @@ def test_a_list_takes_values_side_by_side():
 def test_axes_are_spaced_evenly_or_by_logarithms():
     np.testing.assert_allclose(spaced(1, 3, 5).values, (1, 1.5, 2, 2.5, 3))
     np.testing.assert_allclose(spaced(1, 100, 3, logarithmic=True).values, (1, 10, 100))
+    assert spaced(0.2, 0.4, 3).values == (0.2, 0.3, 0.4)  # a body of 0.30000000000000004 m would be another one
+    assert spaced(1 / 3, np.pi, 2).values == (1 / 3, np.pi)
+    assert spaced(1 / 3, 2, 1).values == (1 / 3,)
     with pytest.raises(InputError, match="above zero"):
         spaced(0, 1, 3, logarithmic=True)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+import re
 from contextlib import suppress
 from inspect import Parameter, isabstract, isclass, isfunction, signature
 
@@ -59,6 +60,38 @@ def test_another_type_is_answered(name):
         call()
 
 
+CALLS = {
+    "missing": (lambda: fd.forward(end=1), "forward: scene and output_step are missing; give scene=..."),
+    "one is missing": (lambda: fp.polyline([(0, 0, 0), (1, 0, 0)]), "polyline: member is missing; give member=..."),
+    "unknown": (lambda: fd.rigid_body("a", mas=1), "rigid_body: there is no argument 'mas'; did you mean 'mass'?"),
+    "of settings": (
+        lambda: fd.inverse(SCENE, end=1, output_step=0.1, begin="steady"),
+        "inverse: there is no argument 'begin'; Dynamic has it: elastic=Dynamic(begin=...)",
+    ),
+    "none alike": (
+        lambda: fd.Tolerances(1e-6, noise=2),
+        "Tolerances: there is no argument 'noise'; there are relative, position, velocity and elastic",
+    ),
+    "without its name": (
+        lambda: fd.Body("rod", ROD, (0, 0, 1)),
+        "Body: (0, 0, 1) is given without its name, as only name and model may be; write position=(0, 0, 1) if that is meant",
+    ),
+    "without any name": (lambda: fd.Settings(0.0), "Settings: 0.0 is given without its name; write start=0.0 if"),
+    "one too many": (lambda: fp.circle(1, 2), "circle: 2 is given without its name, as only d may be"),
+    "given twice": (
+        lambda: fd.static(SCENE, scene=SCENE),
+        "static: scene is given twice, by its place and by its name",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", CALLS)
+def test_arguments_that_are_missing_or_unknown_are_answered(name):
+    call, words = CALLS[name]
+    with pytest.raises(fd.InputError, match=f"^{re.escape(words)}"):
+        call()
+
+
 def required(thing: object) -> list[Parameter]:
     return [
         of
@@ -87,8 +120,6 @@ def test_nothing_that_fails_for_an_object_fails_otherwise(door, name):
 
 
 def test_failures_of_right_arguments_stay_what_they_are():
-    with pytest.raises(TypeError, match="missing"):
-        fp.polyline([(0, 0, 0), (1, 0, 0)])  # Python's to tell
     with pytest.raises(ZeroDivisionError):
         fp.from_frame(LINE, [fp.InterfaceRegion("nearest 0,0,0")], progress=lambda text: 1 / 0)
 
