@@ -19,11 +19,13 @@ from ffr_dyn.equations.layout import to_body_axes
 from ffr_dyn.functions.rotation import skew
 from ffr_dyn.linear.eigen import NULL, SLOWEST, Eigen, eigen
 from ffr_dyn.linear.hill import Varying, hill
-from ffr_dyn.linear.steady_state import Steady
+from ffr_dyn.linear.steady_state import Steady, turning_freely
 from ffr_dyn.linear.whirl import parted
 from ffr_prep.common.arrays import Array
 
 SKEW = 1e-3  # of a stiffness: what has no potential, beside which its motions are still those of an energy
+STEADILY = 1e-3  # of the speed: what it drifts by at most while it grows or decays, for that to be told
+ALIKE = 0.9  # of a mode: what is along the turning, of a change of the speed
 TOLD = 1e-4  # of frequencies that more harmonics would change, relative
 CUT = (
     "what turns and its supports change so much with the angle, and turn so slowly, that modes take more harmonics than "
@@ -91,7 +93,7 @@ def reduced(found: Steady) -> Reduced:
 def modes_of(found: Steady) -> Modes:
     """The modes of a steady motion in its free motions."""
     of = reduced(found)
-    mean, varying = eigen(of.K, of.C), _varying(found, of)
+    mean, varying = _of_the_mean(found, of), _varying(found, of)
     step = varying.step if varying.rate else 0
     if not step:
         return Modes(mean.values, _parted(found, mean)[None], mean.free, 0.0)
@@ -101,6 +103,22 @@ def modes_of(found: Steady) -> Modes:
     values[: mean.free], parts[..., : mean.free] = 0.0, 0.0
     parts[h, :, : mean.free] = mean.vectors[:, : mean.free]
     return Modes(values, parts, mean.free, step * varying.rate, all_of.left)
+
+
+def _of_the_mean(found: Steady, of: Reduced) -> Eigen:
+    """Modes of what does not vary. What turns on by itself keeps its speed, which is given, where that would change as slowly
+    as by what nothing balances: the drag of an unbalance, which falls beyond a critical speed, makes none grow."""
+    g, complete = turning_freely(found)
+    mean = eigen(of.K, of.C, loose=complete[:, :g])
+    if not found.Z.size or not g:
+        return mean
+    loose, V = found.Z @ complete[:, :g], to_body_axes(found.machine.place, found.x, found.v)
+    drift = np.abs(loose.T @ found.about.forces).max() / np.abs(loose.T @ found.about.M @ V).max()
+    along, size = np.linalg.norm(complete[:, :g].T @ mean.vectors, axis=0), np.linalg.norm(mean.vectors, axis=0)
+    slow = (along >= ALIKE * size) & (mean.values.imag == 0) & (np.abs(mean.values) <= drift / STEADILY)
+    slow[: mean.free] = True
+    order = np.argsort(~slow, kind="stable")
+    return Eigen(np.where(slow, 0.0, mean.values)[order], mean.vectors[:, order], int(slow.sum()))
 
 
 def _parted(found: Steady, of: Eigen) -> Array:

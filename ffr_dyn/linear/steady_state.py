@@ -546,7 +546,7 @@ def _multipliers(about: Matrices, forces: Array) -> Array:
 
 def _solved(near: Steady, forces: Array) -> Array:
     """(V,) the smallest free motion that balances forces (V,); none along what has no stiffness, or turns on by itself."""
-    g, complete = _turning_on(near)
+    g, complete = turning_freely(near)
     Z = near.Z @ complete[:, g:]
     if not Z.size:
         return np.zeros(forces.size)
@@ -556,7 +556,7 @@ def _solved(near: Steady, forces: Array) -> Array:
     return found
 
 
-def _turning_on(near: Steady) -> tuple[int, Array]:
+def turning_freely(near: Steady) -> tuple[int, Array]:
     """How many free motions only turn on what turns by itself; with them first, (d, d) free motions that are orthogonal."""
     system, about = near.machine.system, near.about
     now = At(system.scene, system.layout, near.machine.time, near.x, near.v)
@@ -577,7 +577,7 @@ def _require_balance(found: Steady, unbalanced: float) -> None:
     about, Z = found.about, found.Z
     left = Z.T @ about.forces
     U, values, _ = np.linalg.svd(Z.T @ about.K @ Z)
-    g, complete = _turning_on(found)
+    g, complete = turning_freely(found)
     loose = np.concatenate([U[:, values <= _neutral(found, values)], complete[:, :g]], axis=1)
     along = loose.T @ left
     if np.abs(along).max(initial=0.0) <= unbalanced * _size_of_forces(found):

@@ -207,3 +207,35 @@ def test_a_diagram_that_begins_at_a_critical_speed_says_to_begin_beside_it():
     scene = replace(scene, bodies=(hub, replace(disc, model=model)))
     with pytest.raises(fd.InputError, match="at a critical speed, where nothing holds a shaft, begin beside it"):
         fd.campbell(scene, speeds=(100.0, 130.0), modes=2)
+
+
+# ---- a rigid disc whose centre of mass is off its axis, in damped bearings that are alike; nothing drives it ---------------
+
+
+def off_its_axis(speed: float, off: float = 1e-4) -> fd.Scene:
+    """2 kg; critical at sqrt(2 k / m) = 141.42 rad/s, or of the damped vibration at sqrt(2 k / m - (c / m)^2)."""
+    ends = {"l": (0, 0, -0.3), "r": (0, 0, 0.3)}
+    disc = fd.rigid_body("disc", mass=2.0, inertia=(0.1, 0.1, 0.2), centre_of_mass=(off, 0, 0), points=ends)
+    k, c = (2e4, 2e4, 1e4, 0, 0, 0), (3.0, 3.0, 0, 0, 0, 0)
+    bearings = [fd.Bushing(f"at_{side}", f"ground.{side}", f"disc.{side}", k, c) for side in "lr"]
+    return fd.Scene([fd.Body("disc", disc, omega_bar=(0, 0, speed))], forces=bearings, ground=ends)
+
+
+@pytest.mark.parametrize(("speed", "off"), [(145.0, 1e-5), (150.0, 1e-4), (200.0, 1e-3)])
+def test_the_drag_of_an_unbalance_is_no_instability(speed, off):
+    """It brakes the rotor less beyond the critical speed the faster it turns. The shaft goes around by e w^2 / |w_0^2 - w^2 +
+    i w c / m|."""
+    found = fd.steady(off_its_axis(speed, off))
+    assert found.attributes["stable"] == 1
+    assert found.attributes["notes"] == []
+    exact = off * speed**2 / abs(2e4 - speed**2 + 3j * speed)
+    assert np.hypot(*found["disc.R"][0, :2]) == pytest.approx(exact, rel=1e-4)
+
+
+@pytest.mark.slow  # with the drag above
+def test_a_damped_unbalanced_rotor_has_one_forward_critical_speed_and_no_limit():
+    """Its slow turning, which nothing holds, was a vibration by rounding, and the whirl grew with it."""
+    found = fd.campbell(off_its_axis(1.0), speeds=(50.0, 130.0, 150.0, 250.0), modes=6).attributes
+    speeds = [one["speed"] for one in found["critical"] if one["mode"].endswith("shift y, forward")]
+    assert speeds == pytest.approx([np.sqrt(2e4 - 1.5**2)], rel=2e-5)
+    assert found["limits"] == []
