@@ -91,9 +91,52 @@ def reduced(found: Steady) -> Reduced:
 
 
 def modes_of(found: Steady) -> Modes:
-    """The modes of a steady motion in its free motions."""
-    of = reduced(found)
-    mean, varying = _of_the_mean(found, of), _varying(found, of)
+    """The modes of a steady motion in its free motions.
+
+    What turns on by itself keeps its speed where the speed is given, as nothing in the scene balances what would change it:
+    the drag of an unbalance falls beyond a critical speed, and would make it grow; bent far there, a shaft would shake it.
+    """
+    g, complete = turning_freely(found)
+    loose, of = complete[:, :g], reduced(found)
+    mean = eigen(of.K, of.C, loose=loose)
+    if not _speed_is_given(found, loose, mean):
+        return _modes_with(found, of, mean)
+    others = _without_spin(found, loose)
+    held = replace(found, Z=found.Z @ others)
+    of = reduced(held)
+    rest = _modes_with(held, of, eigen(of.K, of.C))
+    free, h = 2 * g + rest.free, len(rest.parts) // 2
+    parts = np.concatenate([np.zeros((2 * h + 1, len(complete), 2 * g)), others @ rest.parts], axis=2)
+    parts[h, :, : 2 * g] = np.tile(loose, 2)
+    return replace(rest, values=np.concatenate([np.zeros(2 * g), rest.values]), parts=parts, free=free)
+
+
+def _speed_is_given(found: Steady, loose: Array, mean: Eigen) -> bool:
+    """Whether what turns on, by motions (d, g), is out of balance, and its speed grows or decays no faster than that drives
+    it."""
+    if not loose.size:
+        return False
+    turning = found.Z @ loose
+    momentum = turning.T @ found.about.M @ to_body_axes(found.machine.place, found.x, found.v)
+    drift = np.abs(turning.T @ found.about.forces).max() / np.abs(momentum).max()
+    along, size = np.linalg.norm(loose.T @ mean.vectors, axis=0), np.linalg.norm(mean.vectors, axis=0)
+    slow = (along >= ALIKE * size) & (np.abs(mean.values) <= drift / STEADILY)
+    return bool(slow[mean.free :].any())
+
+
+def _without_spin(found: Steady, loose: Array) -> Array:
+    """(d, d - g) orthonormal motions that change no angular momentum of the bodies' own turning in the motions (d, g)."""
+    place, turning = found.machine.place, found.Z @ loose
+    spins = np.zeros_like(turning)
+    for b in range(len(place.n)):
+        spins[place.omega(b)] = turning[place.omega(b)]
+    others: Array = np.linalg.qr(found.Z.T @ found.about.M @ spins, mode="complete")[0][:, loose.shape[1] :]
+    return others
+
+
+def _modes_with(found: Steady, of: Reduced, mean: Eigen) -> Modes:
+    """Those of the mean, or Hill's where stiffness and damping vary."""
+    varying = _varying(found, of)
     step = varying.step if varying.rate else 0
     if not step:
         return Modes(mean.values, _parted(found, mean)[None], mean.free, 0.0)
@@ -103,22 +146,6 @@ def modes_of(found: Steady) -> Modes:
     values[: mean.free], parts[..., : mean.free] = 0.0, 0.0
     parts[h, :, : mean.free] = mean.vectors[:, : mean.free]
     return Modes(values, parts, mean.free, step * varying.rate, all_of.left)
-
-
-def _of_the_mean(found: Steady, of: Reduced) -> Eigen:
-    """Modes of what does not vary. What turns on by itself keeps its speed, which is given, where that would change as slowly
-    as by what nothing balances: the drag of an unbalance, which falls beyond a critical speed, makes none grow."""
-    g, complete = turning_freely(found)
-    mean = eigen(of.K, of.C, loose=complete[:, :g])
-    if not found.Z.size or not g:
-        return mean
-    loose, V = found.Z @ complete[:, :g], to_body_axes(found.machine.place, found.x, found.v)
-    drift = np.abs(loose.T @ found.about.forces).max() / np.abs(loose.T @ found.about.M @ V).max()
-    along, size = np.linalg.norm(complete[:, :g].T @ mean.vectors, axis=0), np.linalg.norm(mean.vectors, axis=0)
-    slow = (along >= ALIKE * size) & (mean.values.imag == 0) & (np.abs(mean.values) <= drift / STEADILY)
-    slow[: mean.free] = True
-    order = np.argsort(~slow, kind="stable")
-    return Eigen(np.where(slow, 0.0, mean.values)[order], mean.vectors[:, order], int(slow.sum()))
 
 
 def _parted(found: Steady, of: Eigen) -> Array:

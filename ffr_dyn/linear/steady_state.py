@@ -66,7 +66,10 @@ BALANCED = (
     1e-13  # of forces relative to all, and of rows relative to their sizes: what is left of a balance by rounding
 )
 NEUTRAL = 1e-13  # of a stiffness relative to the largest: rounding
-UNBALANCED = 1e-6  # of forces along motions without stiffness, relative to all
+UNBALANCED, LET_GO = (
+    1e-6,
+    1e-7,
+)  # of forces along what turns on, and along other motions without stiffness, relative to all
 VARIES, OPENS = 1e-7, 1e-7  # of forces and stiffness over a turn, relative; of rows, relative to the scene
 ALL_TURN = (
     "bodies that no joint ties to what is driven turn with it: with the velocities that the scene gives them, forces on them "
@@ -327,9 +330,12 @@ def steady_state(
     time: float,
     start: Array | None = None,
     reached: Callable[[Machine, Array], Steady] | None = None,
+    *,
+    varies: bool = False,
 ) -> Steady:
     """The steady motion with the velocities of an assembled scene at `time` [s]; `start` (X,) is where to begin to look, and
-    `reached` how it is found from there: `from_rest`, the default, or `nearby`.
+    `reached` how it is found from there: `from_rest`, the default, or `nearby`. varies : whether forces or stiffness are
+    known to change with the angle, as at another speed, so that none is looked for that stands at this one.
 
     Raises InputError for a scene whose joints do not allow it, and for a motion that something drives or brakes;
     ComputationError where the bodies find no balance.
@@ -337,6 +343,8 @@ def steady_state(
     system, reach = assembled.system, reached or from_rest
     machine = Machine(system, time, screws_of(system.layout, assembled.x, assembled.v))
     begin = assembled.x if start is None else start
+    if varies:
+        return _of_the_mean(machine, begin, reach)
     found = reach(machine, begin)
     together, refused = _together(found), _not_lasting(found)
     if refused and (together is None or _not_lasting(reach(together, begin))):
@@ -350,6 +358,16 @@ def steady_state(
     if varying > VARIES:
         found = reach(replace(found.machine, phases=_phases(found.machine)), found.x)
         notes = (*notes, _varies(varying, found.machine.screws.rate))
+    return replace(found, notes=notes)
+
+
+def _of_the_mean(machine: Machine, x: Array, reach: Callable[[Machine, Array], Steady]) -> Steady:
+    """That of the forces' mean over a turn, near x (X,)."""
+    found = reach(replace(machine, phases=_phases(machine)), x)
+    if refused := _not_lasting(replace(found, machine=machine)):
+        raise refused
+    notes, varying = _turned_on(machine, found.x), _varying(_at(machine, found.x))
+    notes = (*notes, _varies(varying, machine.screws.rate)) if varying > VARIES else notes
     return replace(found, notes=notes)
 
 
@@ -448,20 +466,22 @@ class LeapError(Exception):
     """No steady motion is known to be near."""
 
 
-def nearby(machine: Machine, x: Array) -> Steady:
-    """By Newton's method alone. Raises LeapError where it fails or may have led to another motion than that near x."""
-    found = _newton(machine, x)
+def nearby(machine: Machine, x: Array, drag: float = UNBALANCED) -> Steady:
+    """By Newton's method alone; `drag` as of `from_rest`. Raises LeapError where it fails or may have led to another motion
+    than that near x."""
+    found = _newton(machine, x, drag=drag)
     if found is None or found.leapt:
         raise LeapError
     return found
 
 
-def from_rest(machine: Machine, x: Array) -> Steady:
-    """By Newton's method, or by shares of the speed that grow."""
+def from_rest(machine: Machine, x: Array, drag: float = UNBALANCED) -> Steady:
+    """By Newton's method, or by shares of the speed that grow; with no more `drag` than that of the forces along what turns
+    on by itself, where something beside the scene keeps its speed."""
     share, size, now, steps = 0.0, 1.0, x, 0
     while True:
         goal = min(share + size, 1.0)
-        found = _newton(replace(machine, screws=machine.screws.times(goal)), now)
+        found = _newton(replace(machine, screws=machine.screws.times(goal)), now, drag=drag)
         if found is not None and goal == 1.0:
             return replace(found, steps=steps + found.steps)
         if found is not None:
@@ -492,8 +512,9 @@ def held_at_rest(machine: Machine, x: Array) -> Steady:
     return found
 
 
-def _newton(machine: Machine, x: Array, unbalanced: float = UNBALANCED) -> Steady | None:
-    """The steady motion near x, None where the steps do not come to an end; with no more `unbalanced` of the forces."""
+def _newton(machine: Machine, x: Array, unbalanced: float = LET_GO, drag: float = UNBALANCED) -> Steady | None:
+    """The steady motion near x, None where the steps do not come to an end; with no more `unbalanced` of the forces along
+    what has no stiffness, and `drag` along what turns on."""
     place, size = machine.place, sizes_of(machine.system)
     about, lengths = _at(machine, x).about, list[float]()
     for count in range(1, ITERATIONS + 1):
@@ -512,7 +533,7 @@ def _newton(machine: Machine, x: Array, unbalanced: float = UNBALANCED) -> Stead
         about = matrices(machine, x, lam)
         if length < TOLERANCE or (length < STALLED and length > 0.5 * min(lengths[:-1], default=np.inf)):
             steady = replace(steady, x=x, v=velocities(place, machine.screws, x), about=about)
-            _require_balance(steady, unbalanced)
+            _require_balance(steady, unbalanced, drag)
             return steady
     return None
 
@@ -572,18 +593,19 @@ def _neutral(near: Steady, values: Array) -> float:
     return NEUTRAL * max(float(values.max(initial=0.0)), near.machine.screws.fastest**2)
 
 
-def _require_balance(found: Steady, unbalanced: float) -> None:
+def _require_balance(found: Steady, unbalanced: float, drag: float) -> None:
     """InputError where forces act along a motion that nothing holds: it speeds up or slows down."""
     about, Z = found.about, found.Z
     left = Z.T @ about.forces
     U, values, _ = np.linalg.svd(Z.T @ about.K @ Z)
     g, complete = turning_freely(found)
-    loose = np.concatenate([U[:, values <= _neutral(found, values)], complete[:, :g]], axis=1)
-    along = loose.T @ left
-    if np.abs(along).max(initial=0.0) <= unbalanced * _size_of_forces(found):
+    turning, slack, size = complete[:, :g], U[:, values <= _neutral(found, values)], _size_of_forces(found)
+    along = turning.T @ left
+    others = slack.T @ (left - turning @ along)
+    if np.abs(along).max(initial=0.0) <= drag * size and np.abs(others).max(initial=0.0) <= unbalanced * size:
         return
     system = found.machine.system
-    motion = named_motion(system.scene, system.layout, found.x, Z @ loose @ along)
+    motion = named_motion(system.scene, system.layout, found.x, Z @ (turning @ along + slack @ others))
     raise InputError(
         f"no steady motion: what acts along {motion} speeds it up or slows it down; add a driver of constant speed, or leave "
         "out the force that does; at a critical speed, where nothing holds a shaft, begin beside it"

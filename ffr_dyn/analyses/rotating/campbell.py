@@ -22,6 +22,7 @@ from ffr_dyn.analyses.settings import MomentSettings
 from ffr_dyn.linear.prestrained import told
 from ffr_dyn.linear.spectrum import Spectrum, followed, spectrum
 from ffr_dyn.linear.speeds import speed_list
+from ffr_dyn.linear.steady_state import NEARLY
 from ffr_dyn.linear.whirl import ONE_WAY, damping_ratios
 from ffr_dyn.results.file import save_result
 from ffr_dyn.results.result import Axis, Quantity, Result
@@ -125,7 +126,7 @@ def campbell(
     at = _at_speeds(scene, turn, time)
     spectra = _spectra(at, values, modes, progress)
     middle = _told_by(spectra)
-    whirling = np.nan_to_num(middle.whirl) > ONE_WAY
+    whirling = _whirling(spectra)
     everything, called = _slowest(spectra, whirling), middle.names
     at = _between_speeds(scene, turn, time)
     order, critical, limits = everything[:modes], list[dict[str, Any]](), list[dict[str, Any]]()
@@ -164,6 +165,15 @@ def _told_by(spectra: Sequence[Spectrum]) -> Spectrum:
     return max((spectra[k] for k in order), key=lambda one: int(np.isfinite(one.whirl).sum()))
 
 
+def _whirling(spectra: Sequence[Spectrum]) -> Array:
+    """(m,) whether a vibration whirls one way, or is any ellipse from the ground, at most speeds at which that is known."""
+    shares = np.array([one.whirl for one in spectra])
+    known = np.isfinite(shares).sum(axis=0)
+    whirls = (np.nan_to_num(shares) > ONE_WAY).sum(axis=0)
+    found: Array = (2 * whirls >= known) & (whirls > 0)
+    return found
+
+
 def _slowest(spectra: Sequence[Spectrum], whirling: Array) -> Array:
     """Numbers of the vibrations by the moduli of their eigenvalues from the ground; last what only decays at all speeds."""
     first = spectra[0]
@@ -178,7 +188,7 @@ def _at_speeds(scene: Scene, turn: str, time: float) -> AtSpeed:
     def at(speed: float, near: Row | None) -> Spectrum:
         last = near and (near[0], near[1].found)
         try:
-            return spectrum(followed_to(scene, speed, turn, time, last)[1])
+            return spectrum(followed_to(scene, speed, turn, time, last, NEARLY)[1])
         except (ComputationError, InputError):  # no balance at all, or none along what has no stiffness
             if held := last and held_near(scene, speed, turn, time, last):
                 return spectrum(held[1])
@@ -194,7 +204,9 @@ def _between_speeds(scene: Scene, turn: str, time: float) -> AtSpeed:
     def at(speed: float, near: Row | None) -> Spectrum:
         if speed not in known:  # of two vibrations crossings are often the same
             last = near and (near[0], near[1].found)
-            found = last and (near_to(scene, speed, turn, time, last) or held_near(scene, speed, turn, time, last))
+            found = last and (
+                near_to(scene, speed, turn, time, last, NEARLY) or held_near(scene, speed, turn, time, last)
+            )
             known[speed] = spectrum(found[1]) if found else followed_there(speed, near)
         return known[speed]
 
@@ -207,13 +219,14 @@ def _between_speeds(scene: Scene, turn: str, time: float) -> AtSpeed:
 def _off_order(ground: bool, order: float) -> Measure:
     """How far a frequency is from a multiple of the speed [rad/s]; zero where it is none but by rounding.
 
-    A whirl that is just as fast as its body stands still in the turning axes. Near there its eigenvalue is real, and says
-    nothing of how fast it is seen.
+    A whirl that is just as fast as its body stands still in the turning axes. Near there its eigenvalue is real, or that of a
+    part which is no largest one, and says nothing of how fast it is seen.
     """
 
     def off(speed: float, one: Spectrum, m: int) -> float:
         value = one.values[m].imag
-        seen = one.speed[m] if ground and value == 0 else one.seen[m] if ground else value
+        still = value == 0 or one.seen[m] == 0
+        seen = one.speed[m] if ground and still else one.seen[m] if ground else value
         found = float(abs(seen) - order * abs(speed))
         return found if abs(found) > MET * abs(speed) else 0.0
 
