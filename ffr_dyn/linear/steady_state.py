@@ -37,7 +37,7 @@ from ffr_dyn.consistency.evaluation import (
 from ffr_dyn.consistency.mobility import named_motion
 from ffr_dyn.consistency.tangent import sizes_of
 from ffr_dyn.equations.forces import At, applied_by
-from ffr_dyn.equations.forces_at_rest import Watched, damping_of
+from ffr_dyn.equations.forces_at_rest import Watched, add_force, damping_of
 from ffr_dyn.equations.forces_in_motion import add_velocities
 from ffr_dyn.equations.inertia import kept_integrals
 from ffr_dyn.equations.layout import Layout, moved, to_body_axes, to_global_axes, velocity_sizes
@@ -66,10 +66,9 @@ BALANCED = (
     1e-13  # of forces relative to all, and of rows relative to their sizes: what is left of a balance by rounding
 )
 NEUTRAL = 1e-13  # of a stiffness relative to the largest: rounding
-UNBALANCED, LET_GO = (
-    1e-6,
-    1e-7,
-)  # of forces along what turns on, and along other motions without stiffness, relative to all
+UNBALANCED = 1e-6  # of forces along what turns on by itself, relative to all
+LET_GO = 1e-7  # the same along other motions without stiffness
+HELD = 1e-6  # of the largest stiffness of forces, from where they hold what would turn
 VARIES, OPENS = 1e-7, 1e-7  # of forces and stiffness over a turn, relative; of rows, relative to the scene
 ALL_TURN = (
     "bodies that no joint ties to what is driven turn with it: with the velocities that the scene gives them, forces on them "
@@ -346,14 +345,13 @@ def steady_state(
     if varies:
         return _of_the_mean(machine, begin, reach)
     found = reach(machine, begin)
-    together, refused = _together(found), _not_lasting(found)
-    if refused and (together is None or _not_lasting(reach(together, begin))):
-        raise refused
+    refused = _not_lasting(found)
     varying, notes = np.inf if refused else _varying(found), tuple[str, ...]()
-    if varying > VARIES and together is not None:
-        one = reach(together, begin)
-        if (less := _varying(one)) < varying and not _not_lasting(one):
-            found, varying, notes = one, less, (ALL_TURN,)
+    one = _all_turning(found, begin, reach) if varying > VARIES else None
+    if one is None and refused:
+        raise refused
+    if one is not None and (less := _varying(one)) < varying:
+        found, varying, notes = one, less, (ALL_TURN,)
     notes = (*_turned_on(found.machine, found.x), *notes)  # of the motion that is taken, not of one that was tried
     if varying > VARIES:
         found = reach(replace(found.machine, phases=_phases(found.machine)), found.x)
@@ -369,6 +367,34 @@ def _of_the_mean(machine: Machine, x: Array, reach: Callable[[Machine, Array], S
     notes, varying = _turned_on(machine, found.x), _varying(_at(machine, found.x))
     notes = (*notes, _varies(varying, machine.screws.rate)) if varying > VARIES else notes
     return replace(found, notes=notes)
+
+
+def _all_turning(found: Steady, x: Array, reach: Callable[[Machine, Array], Steady]) -> Steady | None:
+    """The steady motion near x (X,) in which all bodies turn with the fastest; None where there is none, and where something
+    holds them, as the feet of a casing do."""
+    together = _together(found)
+    if together is None or _held_against_turning(together, found.x):
+        return None
+    try:
+        one = reach(together, x)
+    except (ComputationError, InputError, LeapError):
+        return None
+    return None if _not_lasting(one) else one
+
+
+def _held_against_turning(machine: Machine, x: Array) -> bool:
+    """Whether forces between markers, at rest, are stiff against all bodies turning on together."""
+    now, size = (
+        At(machine.system.scene, machine.place, machine.time, x, np.zeros(machine.place.v_size)),
+        machine.place.v_size,
+    )
+    total = nothing_on(all_placed(now), size)
+    for force in forces_of(now.scene):
+        if min(force.place.ends(now.scene)) >= 0:
+            add_force(total, now, force, {}, {})
+    on = to_body_axes(machine.place, x, velocities(machine.place, machine.screws, x)) / (machine.screws.fastest or 1.0)
+    sizes = sizes_of(machine.system)
+    return bool(-on @ total.tangent @ on > HELD * np.abs(np.diag(total.tangent) * sizes**2).max(initial=0.0))
 
 
 def _together(found: Steady) -> Machine | None:

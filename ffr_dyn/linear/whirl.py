@@ -43,12 +43,12 @@ def whirls(
     Modes of what does not turn, or vibrates along the axis, and those without frequency have the frequency that they have,
     and no share (nan).
     """
-    main = np.argmax((np.abs(parts) ** 2).sum(axis=1), axis=0)
-    seen, share = np.abs(rates[main, np.arange(len(main))]), np.full(len(main), np.nan)
-    speeds = np.linalg.norm(screws.w, axis=1)
+    each, speeds = np.arange(parts.shape[2]), np.linalg.norm(screws.w, axis=1)
     moving = np.array([_integrals(body, place, screws, x, b, parts) for b, body in enumerate(scene.bodies)])
     most = np.argmax(moving.sum(axis=(1, 2)), axis=0)
-    for m in np.flatnonzero(rates[main, np.arange(len(main))]):
+    main = np.argmax(moving[most, :, :, each].sum(axis=1), axis=1)  # of the body that moves most: others turn otherwise
+    seen, share = np.abs(rates[main, each]), np.full(each.size, np.nan)
+    for m in np.flatnonzero(rates[main, each]):
         b = most[m]
         forth, back, along = moving[b, ..., m]
         across = (forth + back).sum()

@@ -166,11 +166,11 @@ def _told_by(spectra: Sequence[Spectrum]) -> Spectrum:
 
 
 def _whirling(spectra: Sequence[Spectrum]) -> Array:
-    """(m,) whether a vibration whirls one way, or is any ellipse from the ground, at most speeds at which that is known."""
-    shares = np.array([one.whirl for one in spectra])
-    known = np.isfinite(shares).sum(axis=0)
-    whirls = (np.nan_to_num(shares) > ONE_WAY).sum(axis=0)
-    found: Array = (2 * whirls >= known) & (whirls > 0)
+    """(m,) whether a vibration whirls one way, or is any ellipse from the ground, or is that of a body that does not turn, at
+    most speeds at which that is known."""
+    known = np.array([(one.seen != 0) & (one.found.machine.screws.fastest > 0) for one in spectra])
+    of_the_ground = np.array([(np.nan_to_num(one.whirl) > ONE_WAY) | (one.speed == 0) for one in spectra]) & known
+    found: Array = (2 * of_the_ground.sum(axis=0) >= known.sum(axis=0)) & of_the_ground.any(axis=0)
     return found
 
 

@@ -10,7 +10,8 @@ import pytest
 import ffr_dyn as fd
 import ffr_prep as fp
 from ffr_dyn.analyses.rotating.campbell import _at_speeds, _crossings, _off_order
-from ffr_dyn.linear.spectrum import followed
+from ffr_dyn.analyses.rotating.steady import steady_states
+from ffr_dyn.linear.spectrum import followed, spectrum
 
 
 def rotor() -> fd.Scene:
@@ -251,3 +252,42 @@ def test_an_unbalance_hides_no_critical_speed_in_unlike_bearings():
     exact = [np.sqrt(k - 1.5**2) for k in (1.2e4, 2e4)]
     assert sorted(speeds) == pytest.approx(exact, rel=1e-4)
     assert found["limits"] == []
+
+
+# ---- a rigid rotor of 2 kg in bearings that are alike, in a casing of 20 kg on feet that are not ---------------------------
+
+
+def in_a_casing(speed: float) -> fd.Scene:
+    ends = {"l": (0, 0, -0.3), "r": (0, 0, 0.3)}
+    disc = fd.rigid_body("disc", mass=2.0, inertia=(0.1, 0.1, 0.2), points=ends)
+    casing = fd.rigid_body("casing", mass=20.0, inertia=(1.5, 1.5, 1.5), points=ends)
+    bearings = [fd.Bushing(f"at_{k}", f"casing.{k}", f"disc.{k}", (1e4, 1e4, 1e4, 0, 0, 0)) for k in "lr"]
+    feet = [fd.Bushing(f"on_{k}", f"ground.{k}", f"casing.{k}", (6e4, 5e4, 8e4, 1e3, 1e3, 1e3)) for k in "lr"]
+    bodies = [fd.Body("disc", disc, omega_bar=(0, 0, speed)), fd.Body("casing", casing)]
+    return fd.Scene(bodies, forces=[*bearings, *feet], ground=ends)
+
+
+def shifts_in_a_casing() -> np.ndarray:
+    """(6,) [rad/s] along x, y and z, closed form."""
+    K = [[[2e4, -2e4], [-2e4, 2e4 + 2 * foot]] for foot in (6e4, 5e4, 8e4)]
+    return np.sort(np.sqrt([np.linalg.eigvals(np.linalg.solve(np.diag([2.0, 20.0]), one)).real for one in K]).ravel())
+
+
+@pytest.mark.parametrize("speed", [pytest.param(60.0, marks=pytest.mark.slow), 300.0])
+def test_vibrations_of_a_rotor_in_its_casing_are_seen_from_the_ground(speed):
+    """Whichever of the two moves more. Where the casing does they were told in axes of the rotor. The casing does not turn
+    along, which would tear it off its feet."""
+    ((_, found),) = steady_states(in_a_casing(speed), ())
+    one = spectrum(found)
+    assert not any("turn with it" in note for note in found.notes)
+    for exact in shifts_in_a_casing():
+        assert np.abs(np.abs(one.seen) - exact).min() < 1e-6 * exact
+
+
+@pytest.mark.slow  # with one speed above
+def test_a_campbell_diagram_of_a_rotor_in_its_casing():
+    found = fd.campbell(in_a_casing(1.0), speeds=[60.0, 240.0, 400.0], modes=12)
+    for row in np.abs(found["seen"]) * 2 * np.pi:
+        for exact in shifts_in_a_casing():
+            assert np.abs(row - exact).min() < 1e-6 * exact
+    assert all(found.attributes["whirling"][m] for m, name in enumerate(found.attributes["names"]) if "casing" in name)
