@@ -19,9 +19,12 @@ from scipy.optimize import brentq
 from ffr_dyn.analyses.registry import OfMoment, option
 from ffr_dyn.analyses.rotating.steady import SPEEDS, TURN, distinct, followed_to, growing, held_near, near_to, rounding
 from ffr_dyn.analyses.settings import MomentSettings
+from ffr_dyn.consistency.assemble import assemble, seen_in_space
+from ffr_dyn.consistency.doubts import checked
+from ffr_dyn.consistency.evaluation import evaluator, record_states
 from ffr_dyn.linear.prestrained import told
 from ffr_dyn.linear.spectrum import Spectrum, followed, spectrum
-from ffr_dyn.linear.speeds import speed_list
+from ffr_dyn.linear.speeds import at_speed, speed_list
 from ffr_dyn.linear.steady_state import NEARLY
 from ffr_dyn.linear.whirl import ONE_WAY, damping_ratios
 from ffr_dyn.results.file import save_result
@@ -141,7 +144,10 @@ def campbell(
             progress(len(values) + count, len(values) + order.size)
     kept = [one.only(order) for one in spectra]
     crossed = {"orders": [float(k) for k in orders], "critical": critical, "limits": limits}
-    result = _as_result(scene, time, values, kept, [called[m] for m in order.tolist()], whirling[order], crossed)
+    doubts = _doubts(scene, turn, time, *max(zip(values, spectra, strict=True), key=lambda row: abs(row[0])))
+    result = _as_result(
+        scene, time, values, kept, [called[m] for m in order.tolist()], whirling[order], crossed, doubts
+    )
     if path is not None:
         save_result(result, path)
     return result
@@ -157,6 +163,13 @@ def _spectra(at: AtSpeed, values: Sequence[float], modes: int, progress: Callabl
     if not spectra[0].values.size:
         raise InputError("nothing vibrates: joints and the driver fix every motion, or what they leave is free")
     return spectra
+
+
+def _doubts(scene: Scene, turn: str, time: float, speed: float, one: Spectrum) -> list[str]:
+    """Notes on the bodies and the joints of the scene, and on what its motion at the fastest speed strains."""
+    assembled, found = assemble(seen_in_space(at_speed(scene, speed, turn, time)), time=time), one.found
+    rows = record_states(evaluator(assembled.system), np.array([time]), found.x[None], found.v[None])
+    return [*assembled.notes, *checked("linearise", assembled, rows)]
 
 
 def _told_by(spectra: Sequence[Spectrum]) -> Spectrum:
@@ -344,13 +357,19 @@ def _as_result(
     names: Sequence[str],
     whirling: Array,
     crossed: dict[str, Any],
+    doubts: Sequence[str],
 ) -> Result:
     values, seen = np.array([one.values for one in spectra]), np.array([one.seen for one in spectra])
     modes = Axis("vibration", tuple(str(k + 1) for k in range(len(names))))
     ratios = np.array([damping_ratios(one.values, one.seen, one.whirl) for one in spectra])
     worst = max((one.prestrained for one in spectra), key=lambda one: one.share)
     unstable = [note for note in [growing(spectra[0].found)] if note]
-    notes = [*distinct(note for one in spectra for note in one.notes), *unstable, *told(worst, names[worst.mode])]
+    notes = [
+        *doubts,
+        *distinct(note for one in spectra for note in one.notes),
+        *unstable,
+        *told(worst, names[worst.mode]),
+    ]
     quantities = {
         "speed": Quantity(np.array(speeds), "rad/s", (), "of what turns"),
         "frequencies": Quantity(np.abs(values.imag) / (2 * np.pi), "Hz", (modes,), "in the turning axes"),

@@ -113,7 +113,7 @@ def steady(
     for at, state in found:
         one = record_states(evaluator(at.system), np.array([time]), state.x[None], state.v[None])
         rows.append(with_all_reactions(at, one))
-        notes += [*at.notes, *state.notes, *checked("static", at, rows[-1])]
+        notes += [*at.notes, *state.notes, *checked("linearise", at, rows[-1])]
         grown = growing(state)
         stable &= not grown
         notes += [grown] if grown else []
