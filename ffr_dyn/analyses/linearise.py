@@ -308,7 +308,9 @@ def _rates_of_shapes(near: Chart, A: Array, solved: Modes, seen: Array, ways: Se
         return rates
     d, y = near.steps.size, solved.parts[0]
     strain = -(y.conj() * (A[d:, :d] @ y)).sum(axis=0).real / np.maximum((np.abs(y) ** 2).sum(axis=0), 1e-300)
-    return np.where(solved.values.imag == 0, np.sqrt(np.abs(strain)), rates)
+    rates = np.where(solved.values.imag == 0, np.sqrt(np.abs(strain)), rates)
+    rates[: solved.free] = 0.0  # whose strain is rounding
+    return rates
 
 
 def _notes(near: Chart, steady: Steady | None, A: Array, rounding: Array | None) -> list[str]:

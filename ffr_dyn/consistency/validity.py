@@ -204,10 +204,11 @@ def unstiffened(scene: Scene, spun: Array) -> list[str]:
     for body, spin in zip(scene.bodies, spun, strict=True):
         share = spin / _first(body) if body.model.n and not stiffened(body) else 0.0
         if share > SPINNING:
+            mend = "reduce it without --linear" if body.stiffening else "leave out stiffening = false"
             notes.append(
-                f"body {body.name!r} spins at up to {spin:.4g} rad/s, {share:.2g} of its first frequency, without geometric "
-                f"stiffening: its frequencies are off by up to {50 * share**2:.2g} %"
-                f"{', and its computed motion may diverge' if share > 1 else ''}; reduce it without --linear"
+                f"body {body.name!r} spins without geometric stiffening, and its frequencies are off by up to "
+                f"{50 * share**2:.2g} %: at {spin:.4g} rad/s, {share:.2g} of the first of them"
+                f"{', where its computed motion may diverge' if share > 1 else ''}; {mend}"
             )
     return notes
 

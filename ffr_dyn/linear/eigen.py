@@ -28,16 +28,21 @@ class Eigen:
     free: int
 
 
-def eigen(K: Array, C: Array, rounding: Array | None = None) -> Eigen:
+def eigen(K: Array, C: Array, rounding: Array | None = None, loose: Array | None = None) -> Eigen:
     """Of stiffness K and damping C (d, d), gyroscopic terms included.
 
     rounding : (d,) of the diagonal of K, below which it is none; by default `NULL` of the largest. Where K is nearly diagonal
                with small entries that are right to their own size, these stay so.
+    loose    : (d, g) orthonormal motions y that are known to have no stiffness, K y = 0. What K is not symmetric by may be
+               more than its rounding, as of a damped rotor with an unbalance: its symmetric part does not show them.
     """
     d = len(K)
-    U = np.linalg.eigh(0.5 * (K + K.T))[1]
-    stiffness = np.einsum("ij,ij->j", U, K @ U)
-    circulating, C = U.T @ (0.5 * (K - K.T)) @ U, U.T @ C @ U
+    loose = np.zeros((d, 0)) if loose is None else loose
+    U = _orthonormal(K, loose)
+    held = np.arange(d) >= loose.shape[1]
+    K, C = np.where(held, U.T @ K @ U, 0.0), U.T @ C @ U
+    stiffness = np.diag(K)
+    circulating = np.where(np.outer(held, held), 0.5 * (K - K.T), K)
     turning = 0.5 * np.abs(C - C.T).max(initial=0.0)
     rate = np.sqrt(max(np.abs(stiffness).max(initial=0.0), np.abs(circulating).max(initial=0.0), turning**2, SLOWEST))
     none = np.full(d, NULL * rate**2) if rounding is None else rounding @ U**2
@@ -57,6 +62,14 @@ def eigen(K: Array, C: Array, rounding: Array | None = None) -> Eigen:
     if free:
         shapes = np.concatenate([still[np.arange(free) % len(still)].T, shapes], axis=1)
     return Eigen(np.concatenate([np.zeros(free), values[order]]), U @ shapes, free)
+
+
+def _orthonormal(K: Array, loose: Array) -> Array:
+    """(d, d) motions: the loose ones (d, g), then others along which the symmetric part of K is diagonal."""
+    g = loose.shape[1]
+    others = np.linalg.qr(loose, mode="complete")[0][:, g:]
+    rest = others.T @ K @ others
+    return np.concatenate([loose, others @ np.linalg.eigh(0.5 * (rest + rest.T))[1]], axis=1)
 
 
 def _without_null_space(A: Array, tolerance: float, most: int) -> tuple[Array, list[tuple[Array, Array]]]:

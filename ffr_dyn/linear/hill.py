@@ -13,6 +13,7 @@ exact. lambda + i j w with y_(k+j) is the same mode; told is the one whose large
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import reduce
 from math import gcd
@@ -64,14 +65,28 @@ def harmonics(over_a_turn: Array) -> Array:
 
 
 def hill(of: Varying) -> Hill:
-    """All modes, two for each coordinate. What turns slowly beside its vibrations takes many harmonics."""
+    """All modes, two for each coordinate. What turns slowly beside its vibrations takes many harmonics; numbers of them that
+    will not do, by what the first ones leave open, are passed over."""
     step, count = of.step, 2 * of.K.shape[1]
-    for h in (h for h in HARMONICS if h <= ANYHOW or (2 * h + 1) * count <= LARGEST):
+    offers = [h for h in HARMONICS if h <= ANYHOW or (2 * h + 1) * count <= LARGEST]
+    known = list[tuple[int, float]]()
+    for h in offers:
+        if h < min(_enough(known), offers[-1]):
+            continue
         values, parts = _distinct(*_solved(of, step, h), step * of.rate, count)
-        left = _left_open(of, step, values, parts)
-        if left <= RESIDUAL:
+        known.append((h, _left_open(of, step, values, parts)))
+        if known[-1][1] <= RESIDUAL:
             break
-    return Hill(*_centred(values, parts, step * of.rate), step, left)
+    return Hill(*_centred(values, parts, step * of.rate), step, known[-1][1])
+
+
+def _enough(known: Sequence[tuple[int, float]]) -> float:
+    """How many harmonics will do, by how much of the equations the last two of `known` leave open: each more leaves the same
+    part of it."""
+    if len(known) < 2 or not 0 < known[-1][1] < known[-2][1]:
+        return 0.0
+    (before, more), (now, less) = known[-2:]
+    return now + float(np.log(RESIDUAL / less) / (np.log(less / more) / (now - before)))
 
 
 def _coefficient(of: Array, k: int) -> Array:

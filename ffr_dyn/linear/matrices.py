@@ -19,11 +19,13 @@ from ffr_dyn.equations.layout import to_body_axes
 from ffr_dyn.functions.rotation import skew
 from ffr_dyn.linear.eigen import NULL, SLOWEST, Eigen, eigen
 from ffr_dyn.linear.hill import Varying, hill
-from ffr_dyn.linear.steady_state import Steady
+from ffr_dyn.linear.steady_state import Steady, turning_freely
 from ffr_dyn.linear.whirl import parted
 from ffr_prep.common.arrays import Array
 
 SKEW = 1e-3  # of a stiffness: what has no potential, beside which its motions are still those of an energy
+STEADILY = 1e-3  # of the speed: what it drifts by at most while it grows or decays, for that to be told
+ALIKE = 0.9  # of a mode: what is along the turning, of a change of the speed
 TOLD = 1e-4  # of frequencies that more harmonics would change, relative
 CUT = (
     "what turns and its supports change so much with the angle, and turn so slowly, that modes take more harmonics than "
@@ -89,9 +91,52 @@ def reduced(found: Steady) -> Reduced:
 
 
 def modes_of(found: Steady) -> Modes:
-    """The modes of a steady motion in its free motions."""
-    of = reduced(found)
-    mean, varying = eigen(of.K, of.C), _varying(found, of)
+    """The modes of a steady motion in its free motions.
+
+    What turns on by itself keeps its speed where the speed is given, as nothing in the scene balances what would change it:
+    the drag of an unbalance falls beyond a critical speed, and would make it grow; bent far there, a shaft would shake it.
+    """
+    g, complete = turning_freely(found)
+    loose, of = complete[:, :g], reduced(found)
+    mean = eigen(of.K, of.C, loose=loose)
+    if not _speed_is_given(found, loose, mean):
+        return _modes_with(found, of, mean)
+    others = _without_spin(found, loose)
+    held = replace(found, Z=found.Z @ others)
+    of = reduced(held)
+    rest = _modes_with(held, of, eigen(of.K, of.C))
+    free, h = 2 * g + rest.free, len(rest.parts) // 2
+    parts = np.concatenate([np.zeros((2 * h + 1, len(complete), 2 * g)), others @ rest.parts], axis=2)
+    parts[h, :, : 2 * g] = np.tile(loose, 2)
+    return replace(rest, values=np.concatenate([np.zeros(2 * g), rest.values]), parts=parts, free=free)
+
+
+def _speed_is_given(found: Steady, loose: Array, mean: Eigen) -> bool:
+    """Whether what turns on, by motions (d, g), is out of balance, and its speed grows or decays no faster than that drives
+    it."""
+    if not loose.size:
+        return False
+    turning = found.Z @ loose
+    momentum = turning.T @ found.about.M @ to_body_axes(found.machine.place, found.x, found.v)
+    drift = np.abs(turning.T @ found.about.forces).max() / np.abs(momentum).max()
+    along, size = np.linalg.norm(loose.T @ mean.vectors, axis=0), np.linalg.norm(mean.vectors, axis=0)
+    slow = (along >= ALIKE * size) & (np.abs(mean.values) <= drift / STEADILY)
+    return bool(slow[mean.free :].any())
+
+
+def _without_spin(found: Steady, loose: Array) -> Array:
+    """(d, d - g) orthonormal motions that change no angular momentum of the bodies' own turning in the motions (d, g)."""
+    place, turning = found.machine.place, found.Z @ loose
+    spins = np.zeros_like(turning)
+    for b in range(len(place.n)):
+        spins[place.omega(b)] = turning[place.omega(b)]
+    others: Array = np.linalg.qr(found.Z.T @ found.about.M @ spins, mode="complete")[0][:, loose.shape[1] :]
+    return others
+
+
+def _modes_with(found: Steady, of: Reduced, mean: Eigen) -> Modes:
+    """Those of the mean, or Hill's where stiffness and damping vary."""
+    varying = _varying(found, of)
     step = varying.step if varying.rate else 0
     if not step:
         return Modes(mean.values, _parted(found, mean)[None], mean.free, 0.0)

@@ -37,7 +37,7 @@ from ffr_dyn.consistency.evaluation import (
 from ffr_dyn.consistency.mobility import named_motion
 from ffr_dyn.consistency.tangent import sizes_of
 from ffr_dyn.equations.forces import At, applied_by
-from ffr_dyn.equations.forces_at_rest import Watched, damping_of
+from ffr_dyn.equations.forces_at_rest import Watched, add_force, damping_of
 from ffr_dyn.equations.forces_in_motion import add_velocities
 from ffr_dyn.equations.inertia import kept_integrals
 from ffr_dyn.equations.layout import Layout, moved, to_body_axes, to_global_axes, velocity_sizes
@@ -66,7 +66,9 @@ BALANCED = (
     1e-13  # of forces relative to all, and of rows relative to their sizes: what is left of a balance by rounding
 )
 NEUTRAL = 1e-13  # of a stiffness relative to the largest: rounding
-UNBALANCED = 1e-6  # of forces along motions without stiffness, relative to all
+UNBALANCED = 1e-6  # of forces along what turns on by itself, relative to all
+LET_GO = 1e-7  # the same along other motions without stiffness
+HELD = 1e-6  # of the largest stiffness of forces, from where they hold what would turn
 VARIES, OPENS = 1e-7, 1e-7  # of forces and stiffness over a turn, relative; of rows, relative to the scene
 ALL_TURN = (
     "bodies that no joint ties to what is driven turn with it: with the velocities that the scene gives them, forces on them "
@@ -327,9 +329,12 @@ def steady_state(
     time: float,
     start: Array | None = None,
     reached: Callable[[Machine, Array], Steady] | None = None,
+    *,
+    varies: bool = False,
 ) -> Steady:
     """The steady motion with the velocities of an assembled scene at `time` [s]; `start` (X,) is where to begin to look, and
-    `reached` how it is found from there: `from_rest`, the default, or `nearby`.
+    `reached` how it is found from there: `from_rest`, the default, or `nearby`. varies : whether forces or stiffness are
+    known to change with the angle, as at another speed, so that none is looked for that stands at this one.
 
     Raises InputError for a scene whose joints do not allow it, and for a motion that something drives or brakes;
     ComputationError where the bodies find no balance.
@@ -337,20 +342,59 @@ def steady_state(
     system, reach = assembled.system, reached or from_rest
     machine = Machine(system, time, screws_of(system.layout, assembled.x, assembled.v))
     begin = assembled.x if start is None else start
+    if varies:
+        return _of_the_mean(machine, begin, reach)
     found = reach(machine, begin)
-    together, refused = _together(found), _not_lasting(found)
-    if refused and (together is None or _not_lasting(reach(together, begin))):
-        raise refused
+    refused = _not_lasting(found)
     varying, notes = np.inf if refused else _varying(found), tuple[str, ...]()
-    if varying > VARIES and together is not None:
-        one = reach(together, begin)
-        if (less := _varying(one)) < varying and not _not_lasting(one):
-            found, varying, notes = one, less, (ALL_TURN,)
+    one = _all_turning(found, begin, reach) if varying > VARIES else None
+    if one is None and refused:
+        raise refused
+    if one is not None and (less := _varying(one)) < varying:
+        found, varying, notes = one, less, (ALL_TURN,)
     notes = (*_turned_on(found.machine, found.x), *notes)  # of the motion that is taken, not of one that was tried
     if varying > VARIES:
         found = reach(replace(found.machine, phases=_phases(found.machine)), found.x)
         notes = (*notes, _varies(varying, found.machine.screws.rate))
     return replace(found, notes=notes)
+
+
+def _of_the_mean(machine: Machine, x: Array, reach: Callable[[Machine, Array], Steady]) -> Steady:
+    """That of the forces' mean over a turn, near x (X,)."""
+    found = reach(replace(machine, phases=_phases(machine)), x)
+    if refused := _not_lasting(replace(found, machine=machine)):
+        raise refused
+    notes, varying = _turned_on(machine, found.x), _varying(_at(machine, found.x))
+    notes = (*notes, _varies(varying, machine.screws.rate)) if varying > VARIES else notes
+    return replace(found, notes=notes)
+
+
+def _all_turning(found: Steady, x: Array, reach: Callable[[Machine, Array], Steady]) -> Steady | None:
+    """The steady motion near x (X,) in which all bodies turn with the fastest; None where there is none, and where something
+    holds them, as the feet of a casing do."""
+    together = _together(found)
+    if together is None or _held_against_turning(together, found.x):
+        return None
+    try:
+        one = reach(together, x)
+    except (ComputationError, InputError, LeapError):
+        return None
+    return None if _not_lasting(one) else one
+
+
+def _held_against_turning(machine: Machine, x: Array) -> bool:
+    """Whether forces between markers, at rest, are stiff against all bodies turning on together."""
+    now, size = (
+        At(machine.system.scene, machine.place, machine.time, x, np.zeros(machine.place.v_size)),
+        machine.place.v_size,
+    )
+    total = nothing_on(all_placed(now), size)
+    for force in forces_of(now.scene):
+        if min(force.place.ends(now.scene)) >= 0:
+            add_force(total, now, force, {}, {})
+    on = to_body_axes(machine.place, x, velocities(machine.place, machine.screws, x)) / (machine.screws.fastest or 1.0)
+    sizes = sizes_of(machine.system)
+    return bool(-on @ total.tangent @ on > HELD * np.abs(np.diag(total.tangent) * sizes**2).max(initial=0.0))
 
 
 def _together(found: Steady) -> Machine | None:
@@ -448,20 +492,22 @@ class LeapError(Exception):
     """No steady motion is known to be near."""
 
 
-def nearby(machine: Machine, x: Array) -> Steady:
-    """By Newton's method alone. Raises LeapError where it fails or may have led to another motion than that near x."""
-    found = _newton(machine, x)
+def nearby(machine: Machine, x: Array, drag: float = UNBALANCED) -> Steady:
+    """By Newton's method alone; `drag` as of `from_rest`. Raises LeapError where it fails or may have led to another motion
+    than that near x."""
+    found = _newton(machine, x, drag=drag)
     if found is None or found.leapt:
         raise LeapError
     return found
 
 
-def from_rest(machine: Machine, x: Array) -> Steady:
-    """By Newton's method, or by shares of the speed that grow."""
+def from_rest(machine: Machine, x: Array, drag: float = UNBALANCED) -> Steady:
+    """By Newton's method, or by shares of the speed that grow; with no more `drag` than that of the forces along what turns
+    on by itself, where something beside the scene keeps its speed."""
     share, size, now, steps = 0.0, 1.0, x, 0
     while True:
         goal = min(share + size, 1.0)
-        found = _newton(replace(machine, screws=machine.screws.times(goal)), now)
+        found = _newton(replace(machine, screws=machine.screws.times(goal)), now, drag=drag)
         if found is not None and goal == 1.0:
             return replace(found, steps=steps + found.steps)
         if found is not None:
@@ -492,8 +538,9 @@ def held_at_rest(machine: Machine, x: Array) -> Steady:
     return found
 
 
-def _newton(machine: Machine, x: Array, unbalanced: float = UNBALANCED) -> Steady | None:
-    """The steady motion near x, None where the steps do not come to an end; with no more `unbalanced` of the forces."""
+def _newton(machine: Machine, x: Array, unbalanced: float = LET_GO, drag: float = UNBALANCED) -> Steady | None:
+    """The steady motion near x, None where the steps do not come to an end; with no more `unbalanced` of the forces along
+    what has no stiffness, and `drag` along what turns on."""
     place, size = machine.place, sizes_of(machine.system)
     about, lengths = _at(machine, x).about, list[float]()
     for count in range(1, ITERATIONS + 1):
@@ -512,7 +559,7 @@ def _newton(machine: Machine, x: Array, unbalanced: float = UNBALANCED) -> Stead
         about = matrices(machine, x, lam)
         if length < TOLERANCE or (length < STALLED and length > 0.5 * min(lengths[:-1], default=np.inf)):
             steady = replace(steady, x=x, v=velocities(place, machine.screws, x), about=about)
-            _require_balance(steady, unbalanced)
+            _require_balance(steady, unbalanced, drag)
             return steady
     return None
 
@@ -546,7 +593,7 @@ def _multipliers(about: Matrices, forces: Array) -> Array:
 
 def _solved(near: Steady, forces: Array) -> Array:
     """(V,) the smallest free motion that balances forces (V,); none along what has no stiffness, or turns on by itself."""
-    g, complete = _turning_on(near)
+    g, complete = turning_freely(near)
     Z = near.Z @ complete[:, g:]
     if not Z.size:
         return np.zeros(forces.size)
@@ -556,7 +603,7 @@ def _solved(near: Steady, forces: Array) -> Array:
     return found
 
 
-def _turning_on(near: Steady) -> tuple[int, Array]:
+def turning_freely(near: Steady) -> tuple[int, Array]:
     """How many free motions only turn on what turns by itself; with them first, (d, d) free motions that are orthogonal."""
     system, about = near.machine.system, near.about
     now = At(system.scene, system.layout, near.machine.time, near.x, near.v)
@@ -572,18 +619,19 @@ def _neutral(near: Steady, values: Array) -> float:
     return NEUTRAL * max(float(values.max(initial=0.0)), near.machine.screws.fastest**2)
 
 
-def _require_balance(found: Steady, unbalanced: float) -> None:
+def _require_balance(found: Steady, unbalanced: float, drag: float) -> None:
     """InputError where forces act along a motion that nothing holds: it speeds up or slows down."""
     about, Z = found.about, found.Z
     left = Z.T @ about.forces
     U, values, _ = np.linalg.svd(Z.T @ about.K @ Z)
-    g, complete = _turning_on(found)
-    loose = np.concatenate([U[:, values <= _neutral(found, values)], complete[:, :g]], axis=1)
-    along = loose.T @ left
-    if np.abs(along).max(initial=0.0) <= unbalanced * _size_of_forces(found):
+    g, complete = turning_freely(found)
+    turning, slack, size = complete[:, :g], U[:, values <= _neutral(found, values)], _size_of_forces(found)
+    along = turning.T @ left
+    others = slack.T @ (left - turning @ along)
+    if np.abs(along).max(initial=0.0) <= drag * size and np.abs(others).max(initial=0.0) <= unbalanced * size:
         return
     system = found.machine.system
-    motion = named_motion(system.scene, system.layout, found.x, Z @ loose @ along)
+    motion = named_motion(system.scene, system.layout, found.x, Z @ (turning @ along + slack @ others))
     raise InputError(
         f"no steady motion: what acts along {motion} speeds it up or slows it down; add a driver of constant speed, or leave "
         "out the force that does; at a critical speed, where nothing holds a shaft, begin beside it"

@@ -4,7 +4,8 @@ Of a body that turns at w about an axis, a point vibrates across it by z = u_1 +
 axes that turn with the body. From the ground z is exp(i w t) times as much, so the two parts have the frequencies w + nu and
 w - nu: whirls forward, with the turning, where these are positive, and backward where they are negative. In bearings that are
 not the same all around a mode has parts at nu and nu + 2 w, and both a forward and a backward one at a frequency from the
-ground: an ellipse. What vibrates along the axis is seen as it is.
+ground: an ellipse. What vibrates along the axis is seen as it is. A disc that tilts moves more along the axis than across it,
+but what it and its shaft do across the axis goes around one way.
 (Genta 2005, Dynamics of Rotating Systems, ch. 4.)
 """
 
@@ -21,7 +22,10 @@ from ffr_prep.body import FlexibleBody
 from ffr_prep.common.arrays import Array
 
 ONE_WAY = 0.7  # of a whirl's amplitude is its larger part, from where the smaller is called a deviation
-ALONG = 0.4  # of what moves across the axis, turning of sections included, from where a motion is one along the axis
+ALONG = (
+    0.4  # of what moves across the axis, sections' turning included, from where what goes around neither way is axial
+)
+ONE_SIDED = 1e-4  # of what moves across the axis, the least that counts as going around neither way
 ONE = 1e-6  # of frequencies that are one, relative to the speed
 EQUAL = 1e-8  # of eigenvalues that are one, relative
 LEAST = 1e-6  # of a turning relative to the fastest body's: what counts as turning
@@ -39,16 +43,18 @@ def whirls(
     Modes of what does not turn, or vibrates along the axis, and those without frequency have the frequency that they have,
     and no share (nan).
     """
-    main = np.argmax((np.abs(parts) ** 2).sum(axis=1), axis=0)
-    seen, share = np.abs(rates[main, np.arange(len(main))]), np.full(len(main), np.nan)
-    speeds = np.linalg.norm(screws.w, axis=1)
+    each, speeds = np.arange(parts.shape[2]), np.linalg.norm(screws.w, axis=1)
     moving = np.array([_integrals(body, place, screws, x, b, parts) for b, body in enumerate(scene.bodies)])
     most = np.argmax(moving.sum(axis=(1, 2)), axis=0)
-    for m in np.flatnonzero(rates[main, np.arange(len(main))]):
+    main = np.argmax(moving[most, :, :, each].sum(axis=1), axis=1)  # of the body that moves most: others turn otherwise
+    seen, share = np.abs(rates[main, each]), np.full(each.size, np.nan)
+    for m in np.flatnonzero(rates[main, each]):
         b = most[m]
         forth, back, along = moving[b, ..., m]
         across = (forth + back).sum()
-        if along.sum() <= ALONG * across and across > 0 and speeds[b] > LEAST * screws.fastest:
+        either = across - np.abs(forth - back).sum()  # goes around neither way, as all that a blade does
+        axial = along.sum() * max(either, ONE_SIDED * across) > ALONG * across**2
+        if not axial and across > 0 and speeds[b] > LEAST * screws.fastest:
             seen[m], share[m] = _from_the_ground(speeds[b], rates[:, m], forth, back)
     return seen, share, most
 

@@ -235,7 +235,7 @@ def _check_geometry(path: Path, unit: str | None, numbers: Mapping[str, float]) 
 
 
 def _check_parameters(path: Path, numbers: Mapping[str, float]) -> None:
-    """Gmsh ignores a parameter that its script does not have."""
+    """Gmsh ignores a parameter that its script does not have, and one that it sets whatever it is given."""
     script = re.sub(r"//.*", "", path.read_text(errors="replace"))
     if re.search(r"^\s*Include\b", script, re.MULTILINE):
         return  # the parameter may be in the other file
@@ -244,6 +244,13 @@ def _check_parameters(path: Path, numbers: Mapping[str, float]) -> None:
     for name in numbers:
         if not re.search(rf"\b{re.escape(name)}\b", script):
             raise InputError(f"{path} has no parameter {name!r}; {choice(name, known)}")
+        first = re.search(rf"(?<![\w.]){re.escape(name)}\s*=(?!=)", script)
+        if name not in known and first and not re.search(rf"\bExists\s*\(\s*{re.escape(name)}\b", script):
+            line = script[first.start() :].partition(";")[0].strip()
+            raise InputError(
+                f"{path} sets {name} itself, whatever is given for it: {line}; write DefineConstant[ {name} = ... ]; in its "
+                "place, whose number is a default"
+            )
 
 
 def _run_gmsh(path: Path, job_file: Path, result: Path) -> None:

@@ -19,9 +19,13 @@ from scipy.optimize import brentq
 from ffr_dyn.analyses.registry import OfMoment, option
 from ffr_dyn.analyses.rotating.steady import SPEEDS, TURN, distinct, followed_to, growing, held_near, near_to, rounding
 from ffr_dyn.analyses.settings import MomentSettings
+from ffr_dyn.consistency.assemble import assemble, seen_in_space
+from ffr_dyn.consistency.doubts import checked
+from ffr_dyn.consistency.evaluation import evaluator, record_states
 from ffr_dyn.linear.prestrained import told
 from ffr_dyn.linear.spectrum import Spectrum, followed, spectrum
-from ffr_dyn.linear.speeds import speed_list
+from ffr_dyn.linear.speeds import at_speed, speed_list
+from ffr_dyn.linear.steady_state import NEARLY
 from ffr_dyn.linear.whirl import ONE_WAY, damping_ratios
 from ffr_dyn.results.file import save_result
 from ffr_dyn.results.result import Axis, Quantity, Result
@@ -125,7 +129,7 @@ def campbell(
     at = _at_speeds(scene, turn, time)
     spectra = _spectra(at, values, modes, progress)
     middle = _told_by(spectra)
-    whirling = np.nan_to_num(middle.whirl) > ONE_WAY
+    whirling = _whirling(spectra)
     everything, called = _slowest(spectra, whirling), middle.names
     at = _between_speeds(scene, turn, time)
     order, critical, limits = everything[:modes], list[dict[str, Any]](), list[dict[str, Any]]()
@@ -140,7 +144,10 @@ def campbell(
             progress(len(values) + count, len(values) + order.size)
     kept = [one.only(order) for one in spectra]
     crossed = {"orders": [float(k) for k in orders], "critical": critical, "limits": limits}
-    result = _as_result(scene, time, values, kept, [called[m] for m in order.tolist()], whirling[order], crossed)
+    doubts = _doubts(scene, turn, time, *max(zip(values, spectra, strict=True), key=lambda row: abs(row[0])))
+    result = _as_result(
+        scene, time, values, kept, [called[m] for m in order.tolist()], whirling[order], crossed, doubts
+    )
     if path is not None:
         save_result(result, path)
     return result
@@ -158,10 +165,26 @@ def _spectra(at: AtSpeed, values: Sequence[float], modes: int, progress: Callabl
     return spectra
 
 
+def _doubts(scene: Scene, turn: str, time: float, speed: float, one: Spectrum) -> list[str]:
+    """Notes on the bodies and the joints of the scene, and on what its motion at the fastest speed strains."""
+    assembled, found = assemble(seen_in_space(at_speed(scene, speed, turn, time)), time=time), one.found
+    rows = record_states(evaluator(assembled.system), np.array([time]), found.x[None], found.v[None])
+    return [*assembled.notes, *checked("linearise", assembled, rows)]
+
+
 def _told_by(spectra: Sequence[Spectrum]) -> Spectrum:
     """That nearest to the middle where most ways of whirling are known: at rest there are none."""
     order = sorted(range(len(spectra)), key=lambda k: abs(k - len(spectra) // 2))
     return max((spectra[k] for k in order), key=lambda one: int(np.isfinite(one.whirl).sum()))
+
+
+def _whirling(spectra: Sequence[Spectrum]) -> Array:
+    """(m,) whether a vibration whirls one way, or is any ellipse from the ground, or is that of a body that does not turn, at
+    most speeds at which that is known."""
+    known = np.array([(one.seen != 0) & (one.found.machine.screws.fastest > 0) for one in spectra])
+    of_the_ground = np.array([(np.nan_to_num(one.whirl) > ONE_WAY) | (one.speed == 0) for one in spectra]) & known
+    found: Array = (2 * of_the_ground.sum(axis=0) >= known.sum(axis=0)) & of_the_ground.any(axis=0)
+    return found
 
 
 def _slowest(spectra: Sequence[Spectrum], whirling: Array) -> Array:
@@ -178,7 +201,7 @@ def _at_speeds(scene: Scene, turn: str, time: float) -> AtSpeed:
     def at(speed: float, near: Row | None) -> Spectrum:
         last = near and (near[0], near[1].found)
         try:
-            return spectrum(followed_to(scene, speed, turn, time, last)[1])
+            return spectrum(followed_to(scene, speed, turn, time, last, NEARLY)[1])
         except (ComputationError, InputError):  # no balance at all, or none along what has no stiffness
             if held := last and held_near(scene, speed, turn, time, last):
                 return spectrum(held[1])
@@ -194,7 +217,9 @@ def _between_speeds(scene: Scene, turn: str, time: float) -> AtSpeed:
     def at(speed: float, near: Row | None) -> Spectrum:
         if speed not in known:  # of two vibrations crossings are often the same
             last = near and (near[0], near[1].found)
-            found = last and (near_to(scene, speed, turn, time, last) or held_near(scene, speed, turn, time, last))
+            found = last and (
+                near_to(scene, speed, turn, time, last, NEARLY) or held_near(scene, speed, turn, time, last)
+            )
             known[speed] = spectrum(found[1]) if found else followed_there(speed, near)
         return known[speed]
 
@@ -207,13 +232,14 @@ def _between_speeds(scene: Scene, turn: str, time: float) -> AtSpeed:
 def _off_order(ground: bool, order: float) -> Measure:
     """How far a frequency is from a multiple of the speed [rad/s]; zero where it is none but by rounding.
 
-    A whirl that is just as fast as its body stands still in the turning axes. Near there its eigenvalue is real, and says
-    nothing of how fast it is seen.
+    A whirl that is just as fast as its body stands still in the turning axes. Near there its eigenvalue is real, or that of a
+    part which is no largest one, and says nothing of how fast it is seen.
     """
 
     def off(speed: float, one: Spectrum, m: int) -> float:
         value = one.values[m].imag
-        seen = one.speed[m] if ground and value == 0 else one.seen[m] if ground else value
+        still = value == 0 or one.seen[m] == 0
+        seen = one.speed[m] if ground and still else one.seen[m] if ground else value
         found = float(abs(seen) - order * abs(speed))
         return found if abs(found) > MET * abs(speed) else 0.0
 
@@ -331,13 +357,19 @@ def _as_result(
     names: Sequence[str],
     whirling: Array,
     crossed: dict[str, Any],
+    doubts: Sequence[str],
 ) -> Result:
     values, seen = np.array([one.values for one in spectra]), np.array([one.seen for one in spectra])
     modes = Axis("vibration", tuple(str(k + 1) for k in range(len(names))))
     ratios = np.array([damping_ratios(one.values, one.seen, one.whirl) for one in spectra])
     worst = max((one.prestrained for one in spectra), key=lambda one: one.share)
     unstable = [note for note in [growing(spectra[0].found)] if note]
-    notes = [*distinct(note for one in spectra for note in one.notes), *unstable, *told(worst, names[worst.mode])]
+    notes = [
+        *doubts,
+        *distinct(note for one in spectra for note in one.notes),
+        *unstable,
+        *told(worst, names[worst.mode]),
+    ]
     quantities = {
         "speed": Quantity(np.array(speeds), "rad/s", (), "of what turns"),
         "frequencies": Quantity(np.abs(values.imag) / (2 * np.pi), "Hz", (modes,), "in the turning axes"),

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -22,7 +23,16 @@ from ffr_dyn.consistency.doubts import checked
 from ffr_dyn.consistency.evaluation import evaluator, joined, record_states
 from ffr_dyn.linear.spectrum import Spectrum, spectrum
 from ffr_dyn.linear.speeds import at_speed, speed_list
-from ffr_dyn.linear.steady_state import LeapError, from_rest, held_at_rest, nearby, nearly_balanced, steady_state
+from ffr_dyn.linear.steady_state import (
+    ALL_TURN,
+    UNBALANCED,
+    LeapError,
+    from_rest,
+    held_at_rest,
+    nearby,
+    nearly_balanced,
+    steady_state,
+)
 from ffr_dyn.linear.steady_state import Steady as Found
 from ffr_dyn.results.quantities import selected
 from ffr_dyn.results.result import Quantity, Result
@@ -103,7 +113,7 @@ def steady(
     for at, state in found:
         one = record_states(evaluator(at.system), np.array([time]), state.x[None], state.v[None])
         rows.append(with_all_reactions(at, one))
-        notes += [*at.notes, *state.notes, *checked("static", at, rows[-1])]
+        notes += [*at.notes, *state.notes, *checked("linearise", at, rows[-1])]
         grown = growing(state)
         stable &= not grown
         notes += [grown] if grown else []
@@ -171,24 +181,25 @@ def steady_states(
 
 
 def followed_to(
-    scene: Scene, speed: float, turn: str, time: float, last: tuple[float, Found] | None
+    scene: Scene, speed: float, turn: str, time: float, last: tuple[float, Found] | None, drag: float = UNBALANCED
 ) -> tuple[Assembled, Found]:
-    """The scene in space and its steady state at a speed [rad/s]: that which the one at the `last` speed becomes.
+    """The scene in space and its steady state at a speed [rad/s]: that which the one at the `last` speed becomes; with no
+    more `drag` than that of the forces, where something beside the scene keeps its speed.
 
     Newton's method from there may leap to another, as from an arm that swings out to one that hangs, where stiffness is low.
     Speeds between are taken then, and a note tells where it leaps all the same.
     """
     if last is None or last[0] == speed:
-        return _first(scene, speed, turn, time, last and last[1].x)
+        return _first(scene, speed, turn, time, last and last[1].x, drag)
     here, found = last
     step, least = speed - here, abs(speed - here) / CLOSEST
     while True:
         goal = speed if abs(speed - here) <= abs(step) * (1 + 1e-9) else here + step
-        near = near_to(scene, goal, turn, time, (here, found))
+        near = near_to(scene, goal, turn, time, (here, found), drag)
         if near is None and abs(step) > least:
             step /= 4
         elif near is None:
-            assembled, other = _at(scene, speed, turn, time, found.x)
+            assembled, other = _at(scene, speed, turn, time, found.x, partial(from_rest, drag=drag))
             leap = f"from {here:.6g} rad/s on the steady motion ends, or leaps to another"
             return assembled, replace(other, notes=(leap, *other.notes))
         elif goal == speed:
@@ -197,10 +208,12 @@ def followed_to(
             here, found, step = goal, near[1], 2 * step
 
 
-def _first(scene: Scene, speed: float, turn: str, time: float, start: Array | None) -> tuple[Assembled, Found]:
+def _first(
+    scene: Scene, speed: float, turn: str, time: float, start: Array | None, drag: float
+) -> tuple[Assembled, Found]:
     """At the first speed [rad/s]; at rest held where its weight would turn it a little, which is no more once it turns."""
     try:
-        return _at(scene, speed, turn, time, start)
+        return _at(scene, speed, turn, time, start, partial(from_rest, drag=drag))
     except InputError as error:
         with suppress(InputError, LeapError):
             assembled, found = _at(scene, speed, turn, time, start, held_at_rest)
@@ -225,17 +238,25 @@ def held_near(
 
 
 def near_to(
-    scene: Scene, speed: float, turn: str, time: float, last: tuple[float, Found]
+    scene: Scene, speed: float, turn: str, time: float, last: tuple[float, Found], drag: float = UNBALANCED
 ) -> tuple[Assembled, Found] | None:
     """The scene at a speed [rad/s] and its steady state that is near to that at the `last` one; None where none is found."""
     try:
-        return _at(scene, speed, turn, time, last[1].x, nearby)
+        return _at(scene, speed, turn, time, last[1].x, partial(nearby, drag=drag), last[1])
     except (ComputationError, InputError, LeapError):
         return None
 
 
 def _at(
-    scene: Scene, speed: float, turn: str, time: float, start: Array | None, reached: Callable[..., Found] = from_rest
+    scene: Scene,
+    speed: float,
+    turn: str,
+    time: float,
+    start: Array | None,
+    reached: Callable[..., Found],
+    other: Found | None = None,
 ) -> tuple[Assembled, Found]:
+    """`other` is the steady motion at another speed, whose forces may be known to change with the angle."""
     assembled = assemble(seen_in_space(at_speed(scene, speed, turn, time)), time=time)
-    return assembled, steady_state(assembled, time, start, reached)
+    varies = other is not None and len(other.machine.phases) > 1 and ALL_TURN not in other.notes
+    return assembled, steady_state(assembled, time, start, reached, varies=varies)

@@ -81,19 +81,19 @@ class Bushing(Force):
             who, self.i, self.j, on_i, on_i if self.axes_j is None else triad(self.axes_j, f"{who}: axes_j")
         )
 
-    @property
+    @cached_property
     def stiffness_matrix(self) -> Array:
         """(6, 6) linear stiffness; zero where a curve is given."""
         given = self.stiffness
         numbers = [0.0 if isinstance(k, Curve) else k for k in given] if np.ndim(given) == 1 else given
         return self._six_by_six(numbers, "stiffness")
 
-    @property
+    @cached_property
     def damping_matrix(self) -> Array:
         """(6, 6) damping."""
         return self._six_by_six(self.damping, "damping")
 
-    @property
+    @cached_property
     def curves(self) -> list[Curve | None]:
         """The curve of each of the six directions, None where the stiffness is a number."""
         return [k if isinstance(k, Curve) else None for k in self.stiffness]

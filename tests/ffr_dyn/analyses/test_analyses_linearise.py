@@ -12,6 +12,8 @@ from test_analyses_kinematic import slider_crank
 from test_analyses_static import flexible, hanging
 from test_quasi_static import rotor
 
+import ffr_dyn as fd
+import ffr_prep as fp
 from ffr_dyn.analyses.efforts import JointEffort, MarkerEffort, recorded, with_effort
 from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.analyses.linearise import Linearise, as_result, linearise
@@ -272,3 +274,22 @@ def test_an_overdamped_mode_has_one_name_for_both_of_its_decays(ratio):
         own = [k for k, leading in enumerate(found.leading) if leading == f"rod: {name} bending, y"]
         expected = -rate * (ratio + np.sqrt(ratio**2 - 1) * np.array([-1, 1]))
         np.testing.assert_allclose(found.eigenvalues[own], expected, rtol=1e-5)
+
+
+def test_a_shaft_that_turns_freely_is_named_by_its_joint():
+    """The strain of its turning is rounding, whatever share of the rounding of its energy that is."""
+    at = {"l": (0, 0, 0), "r": (0.5, 0, 0)}
+    line = fp.polyline([at["l"], at["r"]], fp.Member(fp.circle(0.02), fp.material("steel")), elements=6)
+    model = fp.from_frame(fp.named(line, **at), [fp.InterfaceRegion(k) for k in at])
+    shaft = fp.reduce(model, fp.Request(name="shaft", reference=fp.MeanAxis(), reduction=fp.CraigBampton(4)))
+    disc = fd.rigid_body("disc", mass=20.0, inertia=(0.5, 0.3, 0.3), points={"c": (0, 0, 0)})
+    joints = [
+        fd.Joint("fit", "fixed", "shaft.r", "disc.c"),
+        fd.Joint("a", "revolute", "ground.l", "shaft.l", axis=(1, 0, 0)),
+        fd.Joint("b", "cylindrical", "ground.r", "disc.c", axis=(1, 0, 0)),
+    ]
+    found = fd.linearise(
+        fd.Scene([fd.Body("shaft", shaft), fd.Body("disc", disc, position=at["r"])], joints, ground=at)
+    )
+    assert found.free == 2
+    assert found.leading[0] in ("a.angle", "b.angle")

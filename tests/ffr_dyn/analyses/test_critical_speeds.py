@@ -10,7 +10,8 @@ import pytest
 import ffr_dyn as fd
 import ffr_prep as fp
 from ffr_dyn.analyses.rotating.campbell import _at_speeds, _crossings, _off_order
-from ffr_dyn.linear.spectrum import followed
+from ffr_dyn.analyses.rotating.steady import steady_states
+from ffr_dyn.linear.spectrum import followed, spectrum
 
 
 def rotor() -> fd.Scene:
@@ -207,3 +208,86 @@ def test_a_diagram_that_begins_at_a_critical_speed_says_to_begin_beside_it():
     scene = replace(scene, bodies=(hub, replace(disc, model=model)))
     with pytest.raises(fd.InputError, match="at a critical speed, where nothing holds a shaft, begin beside it"):
         fd.campbell(scene, speeds=(100.0, 130.0), modes=2)
+
+
+# ---- a rigid disc whose centre of mass is off its axis, in damped bearings that are alike; nothing drives it ---------------
+
+
+def off_its_axis(speed: float, off: float = 1e-4, along_y: float = 2e4) -> fd.Scene:
+    """2 kg; critical at sqrt(2 k / m) = 141.42 rad/s, or of the damped vibration at sqrt(2 k / m - (c / m)^2)."""
+    ends = {"l": (0, 0, -0.3), "r": (0, 0, 0.3)}
+    disc = fd.rigid_body("disc", mass=2.0, inertia=(0.1, 0.1, 0.2), centre_of_mass=(off, 0, 0), points=ends)
+    k, c = (2e4, along_y, 1e4, 0, 0, 0), (3.0, 3.0, 0, 0, 0, 0)
+    bearings = [fd.Bushing(f"at_{side}", f"ground.{side}", f"disc.{side}", k, c) for side in "lr"]
+    return fd.Scene([fd.Body("disc", disc, omega_bar=(0, 0, speed))], forces=bearings, ground=ends)
+
+
+@pytest.mark.parametrize(("speed", "off"), [(145.0, 1e-5), (150.0, 1e-4), (200.0, 1e-3)])
+def test_the_drag_of_an_unbalance_is_no_instability(speed, off):
+    """It brakes the rotor less beyond the critical speed the faster it turns. The shaft goes around by e w^2 / |w_0^2 - w^2 +
+    i w c / m|."""
+    found = fd.steady(off_its_axis(speed, off))
+    assert found.attributes["stable"] == 1
+    assert found.attributes["notes"] == []
+    exact = off * speed**2 / abs(2e4 - speed**2 + 3j * speed)
+    assert np.hypot(*found["disc.R"][0, :2]) == pytest.approx(exact, rel=1e-4)
+
+
+@pytest.mark.slow  # with the drag above
+def test_a_damped_unbalanced_rotor_has_one_forward_critical_speed_and_no_limit():
+    """Its slow turning, which nothing holds, was a vibration by rounding, and the whirl grew with it."""
+    found = fd.campbell(off_its_axis(1.0), speeds=(50.0, 130.0, 150.0, 250.0), modes=6).attributes
+    speeds = {one["mode"].split(", ")[1]: one["speed"] for one in found["critical"] if ", " in one["mode"]}
+    exact = np.sqrt(2e4 - 1.5**2)
+    assert speeds["forward"] == pytest.approx(exact, rel=1e-6)
+    assert len([one for one in found["critical"] if abs(one["speed"] - exact) < 10.0]) == 2  # and the backward one
+    assert found["limits"] == []
+
+
+@pytest.mark.slow  # with Hill's determinant of a rotor below
+def test_an_unbalance_hides_no_critical_speed_in_unlike_bearings():
+    """In the mean of a turn it is in resonance between the two, with the mean stiffness, and bends the shaft far there."""
+    found = fd.campbell(off_its_axis(1.0, 1e-3, 1.2e4), speeds=(0.0, 50.0, 100.0, 150.0, 200.0), modes=6).attributes
+    speeds = [one["speed"] for one in found["critical"] if "shift x" in one["mode"] or "shift y" in one["mode"]]
+    exact = [np.sqrt(k - 1.5**2) for k in (1.2e4, 2e4)]
+    assert sorted(speeds) == pytest.approx(exact, rel=1e-4)
+    assert found["limits"] == []
+
+
+# ---- a rigid rotor of 2 kg in bearings that are alike, in a casing of 20 kg on feet that are not ---------------------------
+
+
+def in_a_casing(speed: float) -> fd.Scene:
+    ends = {"l": (0, 0, -0.3), "r": (0, 0, 0.3)}
+    disc = fd.rigid_body("disc", mass=2.0, inertia=(0.1, 0.1, 0.2), points=ends)
+    casing = fd.rigid_body("casing", mass=20.0, inertia=(1.5, 1.5, 1.5), points=ends)
+    bearings = [fd.Bushing(f"at_{k}", f"casing.{k}", f"disc.{k}", (1e4, 1e4, 1e4, 0, 0, 0)) for k in "lr"]
+    feet = [fd.Bushing(f"on_{k}", f"ground.{k}", f"casing.{k}", (6e4, 5e4, 8e4, 1e3, 1e3, 1e3)) for k in "lr"]
+    bodies = [fd.Body("disc", disc, omega_bar=(0, 0, speed)), fd.Body("casing", casing)]
+    return fd.Scene(bodies, forces=[*bearings, *feet], ground=ends)
+
+
+def shifts_in_a_casing() -> np.ndarray:
+    """(6,) [rad/s] along x, y and z, closed form."""
+    K = [[[2e4, -2e4], [-2e4, 2e4 + 2 * foot]] for foot in (6e4, 5e4, 8e4)]
+    return np.sort(np.sqrt([np.linalg.eigvals(np.linalg.solve(np.diag([2.0, 20.0]), one)).real for one in K]).ravel())
+
+
+@pytest.mark.parametrize("speed", [pytest.param(60.0, marks=pytest.mark.slow), 300.0])
+def test_vibrations_of_a_rotor_in_its_casing_are_seen_from_the_ground(speed):
+    """Whichever of the two moves more. Where the casing does they were told in axes of the rotor. The casing does not turn
+    along, which would tear it off its feet."""
+    ((_, found),) = steady_states(in_a_casing(speed), ())
+    one = spectrum(found)
+    assert not any("turn with it" in note for note in found.notes)
+    for exact in shifts_in_a_casing():
+        assert np.abs(np.abs(one.seen) - exact).min() < 1e-6 * exact
+
+
+@pytest.mark.slow  # with one speed above
+def test_a_campbell_diagram_of_a_rotor_in_its_casing():
+    found = fd.campbell(in_a_casing(1.0), speeds=[60.0, 240.0, 400.0], modes=12)
+    for row in np.abs(found["seen"]) * 2 * np.pi:
+        for exact in shifts_in_a_casing():
+            assert np.abs(row - exact).min() < 1e-6 * exact
+    assert all(found.attributes["whirling"][m] for m, name in enumerate(found.attributes["names"]) if "casing" in name)

@@ -437,3 +437,15 @@ def sprung_mass(m: float, k: float, c: float) -> fd.Scene:
     rail = fd.Joint("rail", "translational", "ground.O", "m.c", axis=(1, 0, 0))
     spring = fd.JointSpring("spring", "rail", stiffness=k, damping=c, coordinate="stroke")
     return fd.Scene((fd.Body("m", mass),), (rail,), forces=(spring,), ground={"O": (0, 0, 0)})
+
+
+@pytest.mark.slow  # the notes themselves in test_validity
+def test_steady_motions_and_diagrams_of_a_linear_blade_tell_that_it_does_not_stiffen():
+    """By the fastest of their speeds, and what to do: its body has the second order."""
+    scene = rotor(1.0, stiffening=True)
+    scene = replace(scene, bodies=[replace(body, stiffening=False) for body in scene.bodies])
+    speeds = [0.0, 0.5 * float(np.sqrt(scene.bodies[-1].model.omega2.min()))]
+    for found in (fd.steady(scene, speeds=speeds), fd.campbell(scene, speeds=speeds, modes=1)):
+        (note,) = [note for note in found.attributes["notes"] if "without geometric stiffening" in note]
+        assert "by up to 12 %" in note
+        assert note.endswith("leave out stiffening = false")

@@ -36,8 +36,8 @@ STIFFENED = {"model": {"stiffening": np.zeros((12 + 18, 2, 2))}}
 
 def test_a_body_that_spins_near_its_first_frequency_without_stiffening_is_named():
     (note,) = notes(spinning(8.0))
-    assert "body 'disc' spins at up to 8" in note
-    assert "0.2 of its first frequency" in note
+    assert "body 'disc' spins without geometric stiffening" in note
+    assert "at 8 rad/s, 0.2 of the first of them" in note
     assert "off by up to 2 %" in note
     assert "diverge" not in note
     (note,) = notes(spinning(60.0))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from ffr_dyn.linear.eigen import eigen
 
@@ -61,3 +62,18 @@ def test_a_free_motion_beside_a_damper_has_its_second_zero():
     found = eigen(np.diag([0.0, 1e6]), np.diag([0.0, 1e9]))
     assert found.free == 2
     np.testing.assert_allclose(found.values[2:].real, [-1e-3, -1e9], rtol=1e-3)
+
+
+def test_a_free_motion_that_is_known_stays_free_where_stiffness_is_not_symmetric():
+    """As of a rotor in damped bearings with an unbalance, K y = 0 and y^T K = r: the symmetric part of K has no zero, and its
+    rounding makes a slow vibration of it. Of the quotient, s + c = r^T k^-1 b, it decays."""
+    k, r, b = np.array([2e4, 2.2e4, 1e10]), np.array([0.02, -0.03, 0.04]), np.array([1.0, 3.0, 2.0])
+    K, C = np.diag([0.0, *k]), np.zeros((4, 4))
+    K[0, 1:], C[1:, 0], C[0, 1:], C[0, 0] = r, b, -b, 1e-3
+    turn = np.linalg.qr(RNG.normal(size=(4, 4)))[0]
+    found = eigen(turn @ K @ turn.T, turn @ C @ turn.T, loose=turn[:, :1])
+    assert found.free == 1
+    np.testing.assert_allclose(found.values[0], 0.0)
+    np.testing.assert_allclose(found.values[1], -(1e-3 - (r / k) @ b), rtol=1e-3)
+    for shape in found.vectors[:, :2].T:
+        assert abs(turn[:, 0] @ shape) == pytest.approx(np.linalg.norm(shape), rel=1e-3)

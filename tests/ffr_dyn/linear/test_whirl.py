@@ -9,7 +9,9 @@ from test_quasi_static import rotor
 import ffr_dyn as fd
 from ffr_dyn.consistency.assemble import assemble, in_space
 from ffr_dyn.consistency.evaluation import total_mass_matrix
-from ffr_dyn.linear.whirl import _integral, damping_ratios, ways_of
+from ffr_dyn.linear.steady_state import screws_of
+from ffr_dyn.linear.whirl import _integral, damping_ratios, ways_of, whirls
+from ffr_prep.body import FlexibleBody
 
 
 def test_the_integrals_in_three_directions_are_those_of_the_mass_matrix():
@@ -77,3 +79,54 @@ def test_a_thin_disc_is_followed_by_its_whirls_over_the_speed():
     seen = np.sort(2 * np.pi * found["seen"][:, tilting], axis=1)
     exact = [np.sort(np.roots([0.1, -0.2 * speed, -2 * 2e4 * 0.3**2])) for speed in speeds]
     np.testing.assert_allclose(seen, exact, rtol=1e-8)
+
+
+def ring(*shapes: np.ndarray) -> FlexibleBody:
+    """24 points of 1 kg about x, with elastic coordinates of these shapes (24, 3), on a hub that they do not move."""
+    m, Phi = np.full(24, 1 / 24), np.stack(shapes, axis=2)
+    Phi = Phi / np.sqrt(np.einsum("p,pkj,pkj->j", m, Phi, Phi))
+    return FlexibleBody(
+        name="disc",
+        mass=3.0,
+        r_dm=m @ POINTS,
+        rr_dm=np.einsum("p,pk,pl->kl", m, POINTS, POINTS) + 0.01 * np.eye(3),
+        P_dm=np.einsum("p,pkj->kj", m, Phi),
+        rP_dm=np.einsum("p,pk,plj->klj", m, POINTS, Phi),
+        PP_dm=np.einsum("p,pki,plj->klij", m, Phi, Phi),
+        omega2=np.full(Phi.shape[2], 1e4),
+    )
+
+
+ANGLES = 2 * np.pi * np.arange(24) / 24
+POINTS = 0.2 * np.array([0 * ANGLES, np.cos(ANGLES), np.sin(ANGLES)]).T
+ONES = np.ones((24, 1))
+
+
+def seen_at_50(body: FlexibleBody, shape: tuple[complex, complex]) -> tuple[float, float]:
+    """[rad/s] frequency from the ground, and whirling share, of a mode of 300 rad/s in the axes of the turning body."""
+    assembled = assemble(in_space(fd.Scene([fd.Body("disc", body, omega_bar=(50.0, 0, 0))])))
+    place, parts = assembled.system.layout, np.zeros((1, assembled.system.layout.v_size, 1), complex)
+    parts[0, place.q_dot(0), 0] = shape
+    screws = screws_of(place, assembled.x, assembled.v)
+    found, share, _ = whirls(assembled.system.scene, place, screws, assembled.x, np.array([[300.0]]), parts)
+    return float(found[0]), float(share[0])
+
+
+@pytest.mark.parametrize(
+    ("shape", "seen"), [((1, -1j), 350.0), ((1, 1j), -250.0), ((1, -0.96j), 350.0), ((1, 0), 300.0)]
+)
+def test_a_disc_that_tilts_within_its_body_whirls(shape, seen):
+    """It moves more along the axis than it and its shaft, by a tenth, do across it. Both go around, so that from the ground
+    it is seen at the speed and its frequency, w + nu; a blade, which tilts along a line, at nu."""
+    tilting = [np.outer(POINTS[:, k] / 0.2, [1, 0, 0]) + 0.1 * ONES * np.eye(3)[k] for k in (1, 2)]
+    found, share = seen_at_50(ring(*tilting), shape)
+    assert found == pytest.approx(seen)
+    assert np.isnan(share) == (seen == 300.0)
+
+
+def test_a_disc_that_moves_along_its_axis_does_not_whirl():
+    """Also where its shaft goes around a little."""
+    along = ONES * np.array([1.0, 1e-3, 0]), ONES * np.array([0, 0, 1.0])
+    found, share = seen_at_50(ring(*along), (1, -1e-3j))
+    assert found == 300.0
+    assert np.isnan(share)

@@ -1020,6 +1020,20 @@ def test_parameters_of_an_included_script(tmp_path):
     assert mesh.points[:, 0].max() == 3.0
 
 
+@pytest.mark.parametrize("line", ["x = 2;", "x = DefineNumber[2];"])
+def test_a_number_that_a_script_sets_itself_is_no_parameter(tmp_path, line):
+    """Gmsh takes the script's, and the mesh would be of another size than is asked for."""
+    script = (MESHES / "box.geo").read_text().replace("x = 1, y", "y")
+    (tmp_path / "own.geo").write_text(line + script)
+    assert read_mesh(tmp_path / "own.geo", order=1).points[:, 0].max() == 2.0
+    with pytest.raises(
+        InputError, match=r"own.geo sets x itself, whatever is given for it: x = .*DefineConstant\[ x = "
+    ):
+        read_mesh(tmp_path / "own.geo", numbers={"x": 3.0}, order=1)
+    (tmp_path / "own.geo").write_text(f"If (!Exists(x))\n{line}\nEndIf\n{script}")
+    assert read_mesh(tmp_path / "own.geo", numbers={"x": 3.0}, order=1).points[:, 0].max() == 3.0
+
+
 def test_arguments_that_would_be_ignored(written_by_gmsh):
     with pytest.raises(InputError, match="meshed already"):
         read_mesh(written_by_gmsh / "tet4.msh", size=0.1)

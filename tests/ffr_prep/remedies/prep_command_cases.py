@@ -235,6 +235,7 @@ FILES = [
         s_toml=STRUCTURE,
     ),
     words("mesh end.geo --size 1 --order 1", "mesh part.geo --size 1 --order 1", end_geo="Exit;\n"),
+    words("mesh own.geo --size 1 --set w=1", "mesh part.geo --size 1 --order 1 --set w=0.2", own_geo="w = 2;\n"),
     reduces("--parts 3", "--modes 0 --parts 2"),
     Case(lambda: piped(Path("pipe.ffr")), lambda: with_files(lambda: load_body("body.ffr"), {})),
     Case(lambda: unwritable(REDUCE), lambda: command(REDUCE)),
