@@ -37,9 +37,7 @@ from ffr_prep.common.errors import ComputationError
 ITERATIONS = 30
 TOLERANCE = 1e-12  # of a change of s, relative to its size or to one that strains the body by STRAINED
 STRAINED, BENT = 1e-6, 1e-2  # q over size and root of mass of a body: the least by which changes and differences go
-ROUNDING = (
-    1e-9  # relative as well, of a change that another one follows, or that gets no shorter: what is left is rounding
-)
+ROUNDING = 1e-9  # relative as well, of a change that another one follows, or that gets no shorter
 SHARES = tuple(2.0**-k for k in range(8))
 SLOW = 0.5  # of the change before, from where a new tangent is worth its time
 DIFFERENCE = 1e-6
