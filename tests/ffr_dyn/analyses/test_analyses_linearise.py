@@ -90,9 +90,10 @@ def test_a_damped_flexible_mechanism_decays():
     scene = flexible()
     found = linearise(scene_at(scene, static(scene)))
     assert found.stability_margin < 0
-    assert all(
-        "moving frame" in note for note in found.notes
-    )  # it is an equilibrium, of a body that bends by a seventh
+    doubts = [
+        note for note in found.notes if "ratios in per cent" not in note
+    ]  # of its damping, a half of the critical
+    assert all("moving frame" in note for note in doubts)  # it is an equilibrium, of a body that bends by a seventh
 
 
 def test_a_closed_loop_swings_as_its_energy_says():

@@ -30,7 +30,7 @@ from ffr_prep.solids.model import from_mesh
 Change = tuple[str, str]
 
 GEO = """SetFactory("OpenCASCADE");
-w = 0.1;
+DefineConstant[ w = 0.1 ];
 Box(1) = {0, 0, 0, 1, w, 0.1};
 """
 
