@@ -93,7 +93,8 @@ def assert_swings(result):
     assert np.ptp(total) < 1e-3 * kinetic.max()
     errors = {name: of_range for name, (_, of_range) in result.attributes["errors"].items()}
     assert errors["plate.tip.position"] < 1e-3
-    assert errors["hinge.force"] < 3e-3  # of which a vibration of 8 kHz is a part, and told
+    # A vibration of 8 kHz is a part of it, and told: 0.1 to 0.4 % for pins that are a micrometre apart.
+    assert errors["hinge.force"] < 5e-3
     assert "forces and moments within 0." in result.attributes["accuracy"]
     assert_hottest_at_the_pin(result)
     assert any("does not resolve carries" in note for note in result.attributes["notes"])
