@@ -157,6 +157,6 @@ def test_a_table_whose_spline_swings_far_beyond_its_rows_is_told():
         told.append([note for note in notes if "spline" in note])
     assert told[1] == []
     assert told[0] == [
-        "driver 'cam': the cubic spline through its table goes to -0.05154 at t = 0.01978 s, where its rows hold 0 to 0.03; give "
-        "more rows beside its corners, or a piecewise function"
+        "driver 'cam': the cubic spline through its table goes to -0.05154 at t = 0.01978 s, where its rows hold 0 to 0.03; "
+        "give more rows beside its corners, or a piecewise function"
     ]
