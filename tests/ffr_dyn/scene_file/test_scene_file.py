@@ -367,7 +367,7 @@ MOTOR = '[drivers.m]\njoint = "hinge"\nfunction = '
         ('"30 rpm"', '"30 * lenght"', []),
         ("speed =", "sin =", ["parameters.sin", "taken"]),
         ("speed =", '"a b" =', ["parameters.a b", "cannot be a parameter's name"]),
-        ("[drivers]", MOTOR + '{table = [[0, 2, 1], [0, 1, 2]]}', ["m.function", "must increase; after 2 s comes 1 s"]),
+        ("[drivers]", MOTOR + '{table = [[0, 2, 1], [0, 1, 2]]}', ["drivers.m.function", "after 2 s comes 1 s"]),
         ("[drivers]", MOTOR + '{table = [[0, 1]]}', ["drivers.m", "table"]),
         ("[drivers]", MOTOR + '{polynomial = [1], formula = "t"}', ["exactly one of"]),
         ("[drivers]", MOTOR + '{table_file = "none.csv"}', ["none.csv does not exist"]),
