@@ -345,7 +345,15 @@ def steady_state(
     begin = assembled.x if start is None else start
     if varies:
         return _of_the_mean(machine, begin, reach)
-    found = reach(machine, begin)
+    try:
+        found = reach(machine, begin)
+    except (
+        InputError,
+        LeapError,
+    ) as error:  # a weight across the axis turns what is not balanced at one angle, and not over a turn
+        if (mean := _of_the_mean_if_any(machine, begin, reach)) is None:
+            raise error from None
+        return mean
     refused = _not_lasting(found)
     varying, notes = np.inf if refused else _varying(found), tuple[str, ...]()
     one = _all_turning(found, begin, reach) if varying > VARIES else None
@@ -368,6 +376,14 @@ def _of_the_mean(machine: Machine, x: Array, reach: Callable[[Machine, Array], S
     notes, varying = _turned_on(machine, found.x), _varying(_at(machine, found.x))
     notes = (*notes, _varies(varying, machine.screws.rate)) if varying > VARIES else notes
     return replace(found, notes=notes)
+
+
+def _of_the_mean_if_any(machine: Machine, x: Array, reach: Callable[[Machine, Array], Steady]) -> Steady | None:
+    """The same, None where there is none, or nothing changes over a turn."""
+    try:
+        return _of_the_mean(machine, x, reach) if _varying(_at(machine, x)) > VARIES else None
+    except (ComputationError, InputError, LeapError):
+        return None
 
 
 def _all_turning(found: Steady, x: Array, reach: Callable[[Machine, Array], Steady]) -> Steady | None:

@@ -315,3 +315,14 @@ def test_a_campbell_diagram_of_a_rotor_in_its_casing():
         for exact in shifts_in_a_casing():
             assert np.abs(row - exact).min() < 1e-6 * exact
     assert all(found.attributes["whirling"][m] for m, name in enumerate(found.attributes["names"]) if "casing" in name)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("off", [1e-4, 1e-3])
+def test_a_rotor_level_with_its_axis_turns_under_its_weight(off):
+    """Which turns it at that angle, by m g e, but not over a turn."""
+    scene = replace(off_its_axis(50.0, off), gravity=(0, -9.81, 0))
+    found = fd.steady(scene)
+    exact = off * 50.0**2 / abs(2e4 - 50.0**2 + 150j)
+    assert np.hypot(*found["disc.R"][0, :2]) == pytest.approx(exact, rel=1e-5)
+    assert any("mean over a turn" in note for note in found.attributes["notes"])
