@@ -50,8 +50,8 @@ from ffr_dyn.linear.hill import harmonics
 from ffr_dyn.linear.turning_on import turning_on
 from ffr_dyn.scene.force_kinds import forces_of
 from ffr_dyn.scene.forces.force import Force
-from ffr_dyn.scene.forces.places import AtMarker, OnBody
-from ffr_dyn.scene.scene import markers
+from ffr_dyn.scene.forces.places import AtMarker, BetweenAxes, OnBody
+from ffr_dyn.scene.scene import length_of, markers
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError, InputError
 
@@ -77,6 +77,7 @@ ALL_TURN = (
 PHASES = 8  # of a turn, over which a mean is taken
 TURNS = 16  # of the fastest body, at most, over which it is taken where others have turned by whole turns as well
 SAME = 1e-6  # of a state that is in its steady motion: of velocities and forces, relative
+BESIDE = 1e-6  # of the scene: how far the axis of what turns may pass its bearings
 TURNED = 1.0  # rad: how far on the scene is looked at again
 STEP = 1e-4  # rad, or relative to the bodies: of differences, extrapolated
 
@@ -344,7 +345,15 @@ def steady_state(
     begin = assembled.x if start is None else start
     if varies:
         return _of_the_mean(machine, begin, reach)
-    found = reach(machine, begin)
+    try:
+        found = reach(machine, begin)
+    except (
+        InputError,
+        LeapError,
+    ) as error:  # a weight across the axis turns what is not balanced at one angle, and not over a turn
+        if (mean := _of_the_mean_if_any(machine, begin, reach)) is None:
+            raise error from None
+        return mean
     refused = _not_lasting(found)
     varying, notes = np.inf if refused else _varying(found), tuple[str, ...]()
     one = _all_turning(found, begin, reach) if varying > VARIES else None
@@ -367,6 +376,14 @@ def _of_the_mean(machine: Machine, x: Array, reach: Callable[[Machine, Array], S
     notes, varying = _turned_on(machine, found.x), _varying(_at(machine, found.x))
     notes = (*notes, _varies(varying, machine.screws.rate)) if varying > VARIES else notes
     return replace(found, notes=notes)
+
+
+def _of_the_mean_if_any(machine: Machine, x: Array, reach: Callable[[Machine, Array], Steady]) -> Steady | None:
+    """The same, None where there is none, or nothing changes over a turn."""
+    try:
+        return _of_the_mean(machine, x, reach) if _varying(_at(machine, x)) > VARIES else None
+    except (ComputationError, InputError, LeapError):
+        return None
 
 
 def _all_turning(found: Steady, x: Array, reach: Callable[[Machine, Array], Steady]) -> Steady | None:
@@ -464,11 +481,35 @@ def _turned_on(machine: Machine, x: Array) -> tuple[str, ...]:
     now = At(machine.system.scene, machine.place, machine.time, x, velocities(machine.place, machine.screws, x))
     stiff = [force for force in forces_of(now.scene) if force.holds_turning]
     against = [np.linalg.norm(np.diff(_ends(machine.screws, now, force)[1], axis=0)) for force in stiff]
-    return tuple(
+    notes = tuple(
         f"bushing {force.name!r} is turned on and on, and its moments are for less than half a turn: they are no bearing's. "
         "Leave out its stiffness against rotation; two bushings at a distance along the axis hold a shaft against tilting"
         for force, turning in zip(stiff, against, strict=True)
         if turning > SAME * machine.screws.fastest
+    )
+    return (*notes, *_beside_the_axis(machine, now))
+
+
+def _beside_the_axis(machine: Machine, now: At) -> tuple[str, ...]:
+    """A note on the bushing that holds a turning body to what does not turn farthest from the body's axis."""
+    far, who, placed = 0.0, "", all_placed(now)
+    for force in forces_of(now.scene):
+        if not isinstance(force.place, BetweenAxes):
+            continue
+        u, w = _ends(machine.screws, now, force)
+        turning = np.linalg.norm(w, axis=1) > SAME * machine.screws.fastest
+        if turning.sum() != 1:
+            continue
+        k = int(np.argmax(turning))
+        held = placed[force.place.ends(now.scene)[1 - k]].r
+        beside = np.linalg.norm(np.cross(w[k], u[k] + np.cross(w[k], held))) / float(w[k] @ w[k])
+        far, who = max((far, who), (float(beside), force.name))
+    if far <= BESIDE * length_of(now.scene):
+        return ()
+    return (
+        f"the axis, about which bodies turn by the velocities of the scene, passes bushing {who!r} by up to {far:.3g} m, and "
+        "strains it at every turn: give bodies whose origin is not on the axis the velocity that it has, omega x r, and draw "
+        "a foundation that loads move aside where it then stands",
     )
 
 

@@ -31,6 +31,7 @@ from ffr_dyn.linear.steady_state import (
     held_at_rest,
     nearby,
     nearly_balanced,
+    screws_of,
     steady_state,
 )
 from ffr_dyn.linear.steady_state import Steady as Found
@@ -258,5 +259,13 @@ def _at(
 ) -> tuple[Assembled, Found]:
     """`other` is the steady motion at another speed, whose forces may be known to change with the angle."""
     assembled = assemble(seen_in_space(at_speed(scene, speed, turn, time)), time=time)
+    if not turn and not scene.drivers:
+        assembled = _as_fast(assembled, speed)
     varies = other is not None and len(other.machine.phases) > 1 and ALL_TURN not in other.notes
     return assembled, steady_state(assembled, time, start, reached, varies=varies)
+
+
+def _as_fast(assembled: Assembled, speed: float) -> Assembled:
+    """With velocities by which the fastest body has a speed [rad/s], also where joints have changed those of the scene."""
+    fastest = screws_of(assembled.system.layout, assembled.x, assembled.v).fastest
+    return replace(assembled, v=assembled.v * (abs(speed) / fastest)) if fastest else assembled

@@ -254,6 +254,30 @@ def test_an_unbalance_hides_no_critical_speed_in_unlike_bearings():
     assert found["limits"] == []
 
 
+def with_a_weight(velocity: tuple[float, float, float]) -> fd.Scene:
+    """Of 20 g, 0.1 m from the axis of the disc, on which it is."""
+    scene = off_its_axis(1.0, 0.0)
+    model = fd.rigid_body("weight", mass=0.02, inertia=(1e-6, 1e-6, 1e-6), points={"hub": (-0.1, 0, 0)})
+    ends = {"l": (0, 0, -0.3), "r": (0, 0, 0.3), "c": (0, 0, 0)}
+    disc = replace(scene.bodies[0], model=fd.rigid_body("disc", mass=2.0, inertia=(0.1, 0.1, 0.2), points=ends))
+    weight = fd.Body("weight", model, position=(0.1, 0, 0), velocity=velocity, omega_bar=(0, 0, 1.0))
+    return replace(scene, bodies=(disc, weight), joints=[fd.Joint("fit", "fixed", "disc.c", "weight.hub")])
+
+
+@pytest.mark.slow
+def test_a_body_off_the_axis_without_its_velocity_is_told():
+    """Assembly gives the two the velocities with the least change: they turn about an axis beside the bearings, but at the
+    speed that is asked for. With the velocity the bearings have m r w^2."""
+    told, quiet = (fd.steady(with_a_weight((0, v, 0)), speeds=[60.0]) for v in (0.0, 0.1))
+    (note,) = [note for note in told.attributes["notes"] if "passes bushing" in note]
+    assert "velocity that it has, omega x r" in note
+    assert told["disc.omega_bar"][0, 2] == pytest.approx(60.0, rel=1e-6)
+    assert quiet.attributes["notes"] == []
+    both = quiet["at_l.force"][0] + quiet["at_r.force"][0]
+    exact = 0.02 * 0.1 * 60.0**2 * 4e4 / abs(4e4 - 2.02 * 60.0**2 + 6j * 60.0)
+    assert np.linalg.norm(both[:2]) == pytest.approx(exact, rel=1e-3)
+
+
 # ---- a rigid rotor of 2 kg in bearings that are alike, in a casing of 20 kg on feet that are not ---------------------------
 
 
@@ -291,3 +315,14 @@ def test_a_campbell_diagram_of_a_rotor_in_its_casing():
         for exact in shifts_in_a_casing():
             assert np.abs(row - exact).min() < 1e-6 * exact
     assert all(found.attributes["whirling"][m] for m, name in enumerate(found.attributes["names"]) if "casing" in name)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("off", [1e-4, 1e-3])
+def test_a_rotor_level_with_its_axis_turns_under_its_weight(off):
+    """Which turns it at that angle, by m g e, but not over a turn."""
+    scene = replace(off_its_axis(50.0, off), gravity=(0, -9.81, 0))
+    found = fd.steady(scene)
+    exact = off * 50.0**2 / abs(2e4 - 50.0**2 + 150j)
+    assert np.hypot(*found["disc.R"][0, :2]) == pytest.approx(exact, rel=1e-5)
+    assert any("mean over a turn" in note for note in found.attributes["notes"])
