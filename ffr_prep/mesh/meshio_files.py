@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import contextlib
 import io
+import pickle
+import subprocess
+import sys
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import meshio
 import numpy as np
 
 from ffr_prep.common.arrays import Array
+from ffr_prep.common.children import finished
 from ffr_prep.common.errors import InputError
 from ffr_prep.common.reading import not_of_its_ending
 from ffr_prep.mesh.cells import WEDGE_TURNED
@@ -21,6 +26,11 @@ _VOLUMES = {"tetra": "tet4", "tetra10": "tet10", "hexahedron": "hex8", "hexahedr
 _VOLUMES |= {"wedge": "wedge6", "wedge18": "wedge18", "pyramid": "pyramid5"}
 _FACES = {"triangle": 3, "triangle6": 3, "triangle7": 3, "quad": 4, "quad8": 4, "quad9": 4}
 _MOST_TAGS = 100
+# Formats whose readers look for ever for what a file that is cut off does not have, and how long one may take [s]: any,
+# and for a megabyte.
+_ENDLESS = (".ele", ".node", ".dat", ".tec", ".off", ".ply")
+_PATIENCE, _PER_MEGABYTE = 20.0, 2.0
+_READER = "import meshio, pickle, sys; pickle.dump(meshio.read(sys.argv[1]), open(sys.argv[2], 'wb'))"
 _NO_NODE_TAGS = ("gmsh:dim_tags",)
 _SAVE = "save the mesh as .msh, .med, .unv, .inp, .bdf or .vtu"
 
@@ -53,12 +63,27 @@ def _read(path: Path) -> meshio.Mesh:
         )
     with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()) as said:
         try:
-            return meshio.read(path)
+            return _read_apart(path) if path.suffix.lower() in _ENDLESS else meshio.read(path)
         except (Exception, SystemExit) as error:
             first = [] if isinstance(error, SystemExit) else [f"{type(error).__name__}: {error}"]
             words = " ".join([*first, *said.getvalue().split()])
     fault = f"cannot be read as a mesh ({words}); is it complete, and does its ending name its format? If so, {_SAVE}"
     raise InputError(not_of_its_ending(path, "a mesh", fault))
+
+
+def _read_apart(path: Path) -> meshio.Mesh:
+    """By a process of its own. Raises EOFError where that is ended because it finds no end, ValueError where it fails."""
+    seconds = _PATIENCE + _PER_MEGABYTE * path.stat().st_size / 1e6
+    with TemporaryDirectory() as folder:
+        made = Path(folder) / "mesh"
+        try:
+            done = finished([sys.executable, "-P", "-c", _READER, str(path), str(made)], seconds)
+        except subprocess.TimeoutExpired:
+            raise EOFError(f"no end was found within {seconds:.3g} s") from None
+        if done.returncode:
+            raise ValueError(done.stderr.strip().rpartition("\n")[2])
+        mesh: meshio.Mesh = pickle.loads(made.read_bytes())
+        return mesh
 
 
 def _in_space(path: Path, points: Array) -> Array:

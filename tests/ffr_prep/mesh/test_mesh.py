@@ -1165,3 +1165,19 @@ def test_a_script_with_an_iges_file_needs_millimetres(tmp_path):
 def test_a_size_in_another_unit_is_told_at_once(size, tmp_path):
     with mesher_time_limit(60.0), pytest.raises(InputError, match="in the unit of the file"):
         read_mesh(MESHES / "connecting_rod.geo", unit="mm", size=size)
+
+
+# ---- formats whose readers find no end ------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("ending", "kind"), [("ele", "tetgen"), ("dat", "tecplot")])
+def test_files_cut_off_of_which_meshio_reads_for_ever_are_refused(tmp_path, monkeypatch, ending, kind):
+    mesh = box_mesh("tet4", (1, 1, 1), (2, 1, 1))
+    path = tmp_path / f"box.{ending}"
+    meshio.Mesh(mesh.points, [("tetra", mesh.blocks[0].nodes)]).write(path, file_format=kind)
+    assert read_mesh(path).blocks[0].kind == "tet4"
+    text = path.read_text()
+    path.write_text(text[: len(text) // 2 if ending == "dat" else 20])
+    monkeypatch.setattr("ffr_prep.mesh.meshio_files._PATIENCE", 0.5)
+    with pytest.raises(InputError, match=r"cannot be read as a mesh .* is it complete"):
+        read_mesh(path)
