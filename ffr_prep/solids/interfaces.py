@@ -271,5 +271,5 @@ def _check_overlaps(regions: Sequence[_Region]) -> None:
                 raise InputError(
                     f"rigid interfaces {one.interface.name!r} and {other.interface.name!r} share {shared.size} nodes "
                     f"(node {shared[0]} is the first): a node cannot follow two of them; make one 'mean' or separate "
-                    "the regions"
+                    "the regions (of one surface in several pieces, `near x,y,z` behind a query takes the nearest)"
                 )
