@@ -93,8 +93,11 @@ def assert_swings(result):
     assert np.ptp(total) < 1e-3 * kinetic.max()
     errors = {name: of_range for name, (_, of_range) in result.attributes["errors"].items()}
     assert errors["plate.tip.position"] < 1e-3
-    # A vibration of 8 kHz is a part of it, and told: 0.1 to 0.4 % for pins that are a micrometre apart.
+    # A vibration of 8 kHz is a part of it, and told: 0.1 to 0.4 % for pins that are a micrometre apart, where RK4 with steps
+    # of 0.6 us is 0.05 % away. The worst moment is one of 1e-9 N m, across the hinge.
     assert errors["hinge.force"] < 5e-3
-    assert "forces and moments within 0." in result.attributes["accuracy"]
+    worst = re.search(r"forces and moments within ([\d.]+) %", result.attributes["accuracy"])
+    assert worst is not None
+    assert float(worst[1]) == pytest.approx(100 * max(errors["hinge.force"], errors["hinge.moment"]), rel=0.05)
     assert_hottest_at_the_pin(result)
     assert any("does not resolve carries" in note for note in result.attributes["notes"])
