@@ -347,10 +347,8 @@ def steady_state(
         return _of_the_mean(machine, begin, reach)
     try:
         found = reach(machine, begin)
-    except (
-        InputError,
-        LeapError,
-    ) as error:  # a weight across the axis turns what is not balanced at one angle, and not over a turn
+    except (InputError, LeapError) as error:
+        # A weight across the axis turns what is not balanced at one angle, and not over a turn.
         if (mean := _of_the_mean_if_any(machine, begin, reach)) is None:
             raise error from None
         return mean
@@ -401,10 +399,8 @@ def _all_turning(found: Steady, x: Array, reach: Callable[[Machine, Array], Stea
 
 def _held_against_turning(machine: Machine, x: Array) -> bool:
     """Whether forces between markers, at rest, are stiff against all bodies turning on together."""
-    now, size = (
-        At(machine.system.scene, machine.place, machine.time, x, np.zeros(machine.place.v_size)),
-        machine.place.v_size,
-    )
+    size = machine.place.v_size
+    now = At(machine.system.scene, machine.place, machine.time, x, np.zeros(size))
     total = nothing_on(all_placed(now), size)
     for force in forces_of(now.scene):
         if min(force.place.ends(now.scene)) >= 0:
