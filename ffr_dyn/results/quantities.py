@@ -175,9 +175,10 @@ def _entry(unit: str, axes: tuple[Axis, ...], text: str, values: Callable[[View]
 def _bodies(system: System) -> Named:
     place = system.layout
     for b, body in enumerate(system.scene.bodies):
-        for name, unit, axis, text in _POSES:
-            values = lambda view, b=b, name=name: getattr(view.pose(b), name)  # type: ignore[misc]  # noqa: E731
-            yield f"{body.name}.{name}", _entry(unit, (axis,), text, values)
+        for of, poses in ((View.pose, _POSES), (View.pose_growth, _GROWTHS)):
+            for name, unit, axis, text in poses:
+                values = lambda view, b=b, of=of, name=name: getattr(of(view, b), name)  # type: ignore[misc]  # noqa: E731
+                yield f"{body.name}.{name}", _entry(unit, (axis,), text, values)
         if place.n[b] or (body.kept and body.kept[1]):
             yield from _elastic(system, b)
 
@@ -187,6 +188,8 @@ _POSES = (
     ("p", "1", EULER_PARAMETERS, "Euler parameters, body to global"),
     ("v", "m/s", XYZ, "velocity of the origin, global axes"),
     ("omega_bar", "rad/s", XYZ, "angular velocity, body axes"),
+)
+_GROWTHS = (
     ("a", "m/s^2", XYZ, "acceleration of the origin, global axes"),
     ("alpha_bar", "rad/s^2", XYZ, "angular acceleration, body axes"),
 )

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, TypeVar
 
 import numpy as np
@@ -18,7 +19,7 @@ from ffr_dyn.functions.rotation import rotation_matrix, turn_factors
 from ffr_dyn.kernels.tables import Record
 from ffr_dyn.scene.joints import Joint, frames
 from ffr_dyn.scene.scene import marker_number, markers
-from ffr_prep.body import Interface
+from ffr_prep.body import FrameMarker, Interface
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.brief import Brief
 
@@ -73,9 +74,7 @@ def times(p: Array, r: Array) -> Array:
 
 def summed(rows: Array, q: Array) -> Array:
     """(T, k, n), (T, n) -> (T, k)."""
-    total = np.zeros(rows.shape[:2])
-    for j in range(q.shape[1]):
-        total += rows[:, :, j] * q[:, j, None]
+    total: Array = (rows * q[:, None]).sum(axis=2)
     return total
 
 
@@ -86,35 +85,83 @@ def from_vectors(theta: Array) -> Array:
     return np.concatenate([np.cos(angle / 2)[:, None], half[:, None] * theta], axis=1)
 
 
-def turn_rates(theta: Course) -> tuple[Array, Array]:
-    """(T, 3) angular velocity of axes that turn by rotation vectors, and its derivative, in the axes that stay."""
+def twist(theta: Elastic) -> Array:
+    """(T, 3) angular velocity of axes that turn by rotation vectors, in the axes that stay."""
+    h, h_dot = theta.value, theta.rate
+    b, c = (factor[:, None] for factor in turn_factors(dot(h, h))[:2])
+    across = cross(h, h_dot)
+    return h_dot + b * across + c * cross(h, across)
+
+
+def twist_rate(theta: Elastic) -> Array:
+    """(T, 3) derivative of `twist`."""
     h, h_dot = theta.value, theta.rate
     b, c, b_h, c_h = (factor[:, None] for factor in turn_factors(dot(h, h)))
-    across = cross(h, h_dot)
-    twist = h_dot + b * across + c * cross(h, across)
-    beside = cross(h, theta.growth)
+    across, beside = cross(h, h_dot), cross(h, theta.growth)
     change = theta.growth + b * beside + c * cross(h, beside) + c * cross(h_dot, across)
-    return twist, change + dot(h, h_dot)[:, None] * (b_h * across + c_h * cross(h, across))
+    return change + dot(h, h_dot)[:, None] * (b_h * across + c_h * cross(h, across))
 
 
 @dataclass(frozen=True)
-class Course:
-    """A quantity along the recorded rows, with two time derivatives, each (T, k)."""
+class Elastic:
+    """phi q - q K q / 2 along the recorded rows, with two time derivatives, each (T, k), made when it is asked for.
 
-    value: Array
-    rate: Array
-    growth: Array
+    phi : (k, n);  K : (k, n, n);  q, q_dot, q_ddot : (T, n)
+    """
+
+    phi: Array
+    K: Array
+    q: Array
+    q_dot: Array
+    q_ddot: Array
+
+    @cached_property
+    def value(self) -> Array:
+        straight = shaped(self.phi, self.q)
+        return straight if self._bent is None else straight - 0.5 * summed(self._bent, self.q)
+
+    @cached_property
+    def rate(self) -> Array:
+        straight = shaped(self.phi, self.q_dot)
+        return straight if self._bent is None else straight - summed(self._bent, self.q_dot)
+
+    @cached_property
+    def growth(self) -> Array:
+        straight = shaped(self.phi, self.q_ddot)
+        if self._bent is None:
+            return straight
+        return straight - summed(self._bent, self.q_ddot) - summed(self._curved(self.q_dot), self.q_dot)
+
+    @cached_property
+    def _bent(self) -> Array | None:
+        """(T, k, n) K q; None of shapes without second order."""
+        return self._curved(self.q) if self.K.any() else None
+
+    def _curved(self, q: Array) -> Array:
+        """(T, k, n) K q."""
+        return shaped(self.K.reshape(-1, self.K.shape[2]), q).reshape(-1, *self.K.shape[:2])
+
+
+def _turned_by(theta: Elastic) -> Array:
+    """(T, 3, 3) of rotation vectors."""
+    return rotation_matrix(from_vectors(theta.value))
 
 
 @dataclass(frozen=True)
 class Pose:
-    """A point and axes that move: position R [m], velocity, acceleration, global axes; Euler parameters p (T, 4); angular
-    velocity and acceleration in own axes; each (T, 3)."""
+    """A point and axes that move: position R [m] and velocity, global axes, angular velocity, own axes, each (T, 3); Euler
+    parameters p (T, 4)."""
 
     R: Array
     p: Array
     v: Array
     omega_bar: Array
+
+
+@dataclass(frozen=True)
+class PoseGrowth:
+    """Of a `Pose`: acceleration of the point, global axes, and angular acceleration, own axes; each (T, 3)."""
+
     a: Array
     alpha_bar: Array
 
@@ -153,30 +200,40 @@ class View(Brief):
         found: T = self._known[what]
         return found
 
+    def pose_growth(self, b: int) -> PoseGrowth:
+        """Of the own frame of body b."""
+        return self._once(("pose growth", b), lambda: self._pose_growth(b))
+
     def _pose(self, b: int) -> Pose:
         place, record, frame = self.system.layout, self.record, self.system.scene.bodies[b].frame
         R, p = record.x[:, place.R(b)], record.x[:, place.p(b)]
         V, omega = record.v[:, place.R_dot(b)], record.v[:, place.omega(b)]
-        a, alpha = record.vd[:, place.R_dot(b)], record.vd[:, place.omega(b)]
         if not frame:
-            return Pose(R, p, V, omega, a, alpha)
-        at, A = frame.marker, self._computed_axes(b)
-        point = self._carried(b, at.pivot, self._elastic(b, at.phi_t, at.K[:3]))
-        turned = self._elastic(b, at.phi_r, at.K[3:])
-        own = times(p, from_vectors(turned.value))
-        twist, change = turn_rates(turned)
-        E = rotation_matrix(from_vectors(turned.value))
-        own_omega, own_alpha = to_axes(E, omega + twist), to_axes(E, alpha + change - cross(twist, omega))
-        own_A, arm = rotation_matrix(own), np.broadcast_to(at.pivot, R.shape)
+            return Pose(R, p, V, omega)
+        A, (moved, turned) = self._computed_axes(b), self._pivot(b, frame.marker)
+        at, rate = self._carried(b, frame.marker.pivot, moved)
+        own, own_omega = times(p, from_vectors(turned.value)), to_axes(_turned_by(turned), omega + twist(turned))
+        own_A, arm = rotation_matrix(own), np.broadcast_to(frame.marker.pivot, R.shape)
         spin = cross(own_omega, arm)
         return Pose(
-            R + (to_global(A, point.value) - to_global(own_A, arm)),
+            R + (to_global(A, at) - to_global(own_A, arm)),
             own,
-            V + (to_global(A, point.rate) - to_global(own_A, spin)),
+            V + (to_global(A, rate) - to_global(own_A, spin)),
             own_omega,
-            a + (to_global(A, point.growth) - to_global(own_A, cross(own_alpha, arm) + cross(own_omega, spin))),
-            own_alpha,
         )
+
+    def _pose_growth(self, b: int) -> PoseGrowth:
+        place, record, frame = self.system.layout, self.record, self.system.scene.bodies[b].frame
+        a, alpha = record.vd[:, place.R_dot(b)], record.vd[:, place.omega(b)]
+        if not frame:
+            return PoseGrowth(a, alpha)
+        moved, turned = self._pivot(b, frame.marker)
+        carried = to_global(self._computed_axes(b), self._carried_growth(b, frame.marker.pivot, moved))
+        turning = twist_rate(turned) - cross(twist(turned), record.v[:, place.omega(b)])
+        own_alpha, own_omega = to_axes(_turned_by(turned), alpha + turning), self.pose(b).omega_bar
+        arm = np.broadcast_to(frame.marker.pivot, a.shape)
+        bent = cross(own_alpha, arm) + cross(own_omega, cross(own_omega, arm))
+        return PoseGrowth(a + (carried - to_global(self.axes(b), bent)), own_alpha)
 
     def axes(self, b: int) -> Array:
         """(T, 3, 3) of body b; the ground has the number after the last."""
@@ -201,26 +258,27 @@ class View(Brief):
         p = self.record.x[:, self.system.layout.p(b)]
         return self._once(("computed axes", b), lambda: rotation_matrix(p))
 
-    def _elastic(self, b: int, phi: Array, K: Array) -> Course:
-        """phi q - q K q / 2 of body b, phi (k, n), K (k, n, n)."""
-        q, q_dot = self.q(b), self.q_dot(b)
-        q_ddot = self.record.vd[:, self.system.layout.q_dot(b)]
-        straight = Course(*(shaped(phi, values) for values in (q, q_dot, q_ddot)))
-        if not K.any():
-            return straight
-        bent, bending = (shaped(K.reshape(-1, K.shape[2]), values).reshape(-1, *K.shape[:2]) for values in (q, q_dot))
-        return Course(
-            straight.value - 0.5 * summed(bent, q),
-            straight.rate - summed(bent, q_dot),
-            straight.growth - summed(bent, q_ddot) - summed(bending, q_dot),
+    def _elastic(self, b: int, phi: Array, K: Array) -> Elastic:
+        """Of shapes phi (k, n), K (k, n, n) of body b."""
+        return Elastic(phi, K, self.q(b), self.q_dot(b), self.record.vd[:, self.system.layout.q_dot(b)])
+
+    def _pivot(self, b: int, at: FrameMarker) -> tuple[Elastic, Elastic]:
+        """Displacement and rotation vector of the marker that carries the own frame of body b."""
+        return self._once(
+            ("pivot", b),
+            lambda: (self._elastic(b, at.phi_t, at.K[:3]), self._elastic(b, at.phi_r, at.K[3:])),
         )
 
-    def _carried(self, b: int, at: Array, u: Course) -> Course:
-        """The point at + u of body b as seen from its origin: place, rate and acceleration, in its axes."""
+    def _carried(self, b: int, at: Array, u: Elastic) -> tuple[Array, Array]:
+        """The point at + u of body b as seen from its origin: place and rate, in its axes."""
+        arm = at + u.value
+        return arm, cross(self.record.v[:, self.system.layout.omega(b)], arm) + u.rate
+
+    def _carried_growth(self, b: int, at: Array, u: Elastic) -> Array:
+        """The acceleration of that point."""
         omega, alpha = (values[:, self.system.layout.omega(b)] for values in (self.record.v, self.record.vd))
         arm = at + u.value
-        spin = cross(omega, arm)
-        return Course(arm, spin + u.rate, cross(alpha, arm) + u.growth + cross(omega, spin + 2 * u.rate))
+        return cross(alpha, arm) + u.growth + cross(omega, cross(omega, arm) + 2 * u.rate)
 
     # ---- markers ---------------------------------------------------------------------------------------------------
 
@@ -234,7 +292,7 @@ class View(Brief):
     def _matrices(self, b: int, interface: Interface) -> Array:
         return marker_matrices(self.system.scene.bodies[b], interface.name)
 
-    def _turned(self, b: int, interface: Interface) -> Course:
+    def _turned(self, b: int, interface: Interface) -> Elastic:
         """Rotation vector of a marker."""
         return self._once(
             ("turned", b, interface.name),
@@ -250,9 +308,9 @@ class View(Brief):
         moved = self._elastic(b, interface.phi_t, self._matrices(b, interface)[:3]).value
         if not (frame := self.system.scene.bodies[b].frame):
             return moved
-        at, arm = frame.marker, interface.position - frame.marker.pivot
-        own = rotation_matrix(from_vectors(self._elastic(b, at.phi_r, at.K[3:]).value))
-        return to_axes(own, moved - self._elastic(b, at.phi_t, at.K[:3]).value + arm) - arm
+        pivot, turned = self._pivot(b, frame.marker)
+        arm = interface.position - frame.marker.pivot
+        return to_axes(_turned_by(turned), moved - pivot.value + arm) - arm
 
     def acceleration(self, marker: int) -> Array:
         """(T, 3) R_ddot + A (omega_dot x u + u_ddot + omega x (omega x u) + 2 omega x u_dot)."""
@@ -261,8 +319,8 @@ class View(Brief):
             return np.zeros((self.rows, 3))
         b, interface = owner
         u = self._elastic(b, interface.phi_t, self._matrices(b, interface)[:3])
-        carried = self._carried(b, interface.position, u)
-        return self.record.vd[:, self.system.layout.R_dot(b)] + to_global(self._computed_axes(b), carried.growth)
+        carried = self._carried_growth(b, interface.position, u)
+        return self.record.vd[:, self.system.layout.R_dot(b)] + to_global(self._computed_axes(b), carried)
 
     def orientation(self, marker: int) -> Array:
         """(T, 4) Euler parameters of the marker's axes: those of its body, turned by the elastic rotation."""
@@ -289,7 +347,7 @@ class View(Brief):
             return np.zeros((self.rows, 3))
         omega = self.record.v[:, self.system.layout.omega(owner[0])]
         if self.system.layout.n[owner[0]]:
-            omega = omega + turn_rates(self._turned(*owner))[0]
+            omega = omega + twist(self._turned(*owner))
         return to_global(self._computed_axes(owner[0]), omega)
 
     def frame(self, marker: int, frame: Array) -> Array:
