@@ -12,6 +12,7 @@ from ffr_dyn.consistency.evaluation import free_motions, locked, total_mass_matr
 from ffr_dyn.equations.constraint_rows import Block, rows_at
 from ffr_dyn.equations.constraints import evaluate_word
 from ffr_dyn.equations.layout import Layout
+from ffr_dyn.scene.force_kinds import in_bases
 from ffr_dyn.scene.joints import COORDINATES, RELATION, Joint, Word, coordinate_axes, frames
 from ffr_dyn.scene.scene import Body, Scene, marker_number, require_scene
 from ffr_prep.body import truncated
@@ -88,7 +89,9 @@ def counted(degrees_of_freedom: int, rigid: int, elastic: int, redundant: int) -
 def undeformed(scene: Scene) -> Scene:
     """The scene with rigid bodies of the same inertia and interfaces."""
     require_scene(scene)
-    return replace(scene, bodies=tuple(_rigid(body) if body.model.n else body for body in scene.bodies))
+    none = {body.name: np.zeros((body.model.n, 0)) for body in scene.bodies if body.model.n}
+    bodies = tuple(_rigid(body) if body.name in none else body for body in scene.bodies)
+    return replace(scene, bodies=bodies, forces=in_bases(scene.forces, none))
 
 
 def _rigid(body: Body) -> Body:

@@ -7,16 +7,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from synthetic import cloud
+from test_dyn_forces import PAIRS, SPREAD, loaded
 
 import ffr_prep as fp
 from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.analyses.kinematic import kinematic
 from ffr_dyn.analyses.static import static
 from ffr_dyn.consistency.assemble import assemble
-from ffr_dyn.consistency.mobility import mobility
+from ffr_dyn.consistency.mobility import mobility, undeformed
 from ffr_dyn.functions.time_functions import polynomial, table
 from ffr_dyn.integrators import RK4
 from ffr_dyn.scene.drivers import Driver, PointDriver
+from ffr_dyn.scene.forces import ModalForce
 from ffr_dyn.scene.joints import Joint
 from ffr_dyn.scene.scene import Body, Scene
 from ffr_prep.body import rigid_body
@@ -154,6 +156,16 @@ def test_mobility_of_a_free_flexible_body():
     free = mobility(Scene((Body("b", cloud(3)),)))
     assert (free.degrees_of_freedom, free.elastic, len(free.free)) == (9, 3, 6)
     assert {m.name for m in free.free} >= {"b turn x", "b shift z"}
+
+
+MODAL = ModalForce("s", "one", [1.0, 2.0, 3.0, 4.0])
+
+
+@pytest.mark.parametrize("force", [*PAIRS.values(), *SPREAD.values(), MODAL], ids=[*PAIRS, *SPREAD, "modal"])
+def test_forces_of_all_kinds_leave_the_freedom_of_undeformed_bodies_as_it_is(force):
+    """A ball and a bore: three and two. Forces on elastic coordinates do nothing to bodies that have none."""
+    rigid = undeformed(loaded(force))
+    assert assemble(rigid, time=0.0).degrees_of_freedom == 5
 
 
 def test_flexible_bodies_are_undeformed():

@@ -17,7 +17,7 @@ from ffr_dyn.functions.formula import formula
 from ffr_dyn.functions.time_functions import polynomial
 from ffr_dyn.integrators import RK4
 from ffr_dyn.scene.drivers import Driver
-from ffr_dyn.scene.forces import Load, SpringDamper
+from ffr_dyn.scene.forces import Load, ModalForce, SpringDamper
 from ffr_dyn.scene.joints import Joint
 from ffr_dyn.scene.scene import Body, Scene
 from ffr_prep.body import rigid_body
@@ -82,6 +82,20 @@ def test_a_flexible_scene_stays_where_static_leaves_it():
     run = integrate(scene_at(scene, result), end=0.5, output_step=0.5, method=RK4(1e-3))
     for name in ("two.a.position", "one.q", "A.force", "spring.tension"):
         np.testing.assert_allclose(run[name][-1], result[name][0], atol=1e-7)
+
+
+def test_forces_on_modes_deflect_them_by_force_over_frequency_squared():
+    """They do no work on rigid motions, so that the clamp carries nothing."""
+    body = cloud(3)
+    scene = Scene(
+        (Body("cloud", body),),
+        (Joint("clamp", "fixed", "ground.O", "cloud.a"),),
+        forces=(ModalForce("push", "cloud", [3.0, -2.0, 1.0]),),
+        ground={"O": body.interfaces[0].position},
+    )
+    result = static(scene)
+    np.testing.assert_allclose(result["cloud.q"][0], np.array([3.0, -2.0, 1.0]) / body.omega2, rtol=1e-9)
+    np.testing.assert_allclose([*result["clamp.force"][0], *result["clamp.moment"][0]], 0.0, atol=1e-9)
 
 
 def test_reactions_balance_weight_and_spring():
