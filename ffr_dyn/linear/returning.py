@@ -19,7 +19,7 @@ import numpy as np
 
 from ffr_dyn.kernels.tables import Record
 from ffr_dyn.linear.step_tangents import SAMPLES, periods_of_product, product_of_steps
-from ffr_dyn.linear.turn_map import OWN_PERIOD, Turns, after, deviation, mapped, monodromy, placed
+from ffr_dyn.linear.turn_map import CLOSED, OWN_PERIOD, Turns, after, deviation, mapped, monodromy, placed
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import ComputationError
 
@@ -27,6 +27,7 @@ PERIODS, KEPT = 60, 12  # of the mixing: at most, and how many are mixed
 STALLED = 0.7  # of a step over that of KEPT periods before, from where mixing gives way to Newton's method
 COARSER, FEWEST = 40, 100  # times the steps of cheap periods, and how many of these a period has at least
 AMPLIFIED = 30.0  # of a step over what is open, of cheap maps: beyond it differences are rounding or far from linear
+HALVED = 0.5  # what a Newton step leaves open, at most, by a product of steps that is good enough
 RETURNING = 1e-3  # singular values of 1 - M: M is known no better
 DEAR = 1.0  # periods, that the product of the derivatives of steps may take
 # What counts as brought back, by the step to the fixed point: [rad], or relative to the scene; rates times the period.
@@ -111,9 +112,9 @@ def _searched(of: Turns, s: Array, periods: float) -> Returned:
     known = _Known(image)
     while True:
         closing = known.add(s)
-        if len(known.points) == 1 and of.rows % SAMPLES == 0 and periods_of_product(of) <= DEAR:
-            M = product_of_steps(of, records[0])
-            periods += periods_of_product(of)
+        if len(known.points) == 1:
+            M, cost = _product(of, records[0])
+            periods += cost
         step = known.step(closing, M)
         errors.append(max(_largest(step), _largest(closing)))
         if len(errors) > 1 and _is_back(of, step, records[-1], errors):
@@ -126,6 +127,20 @@ def _searched(of: Turns, s: Array, periods: float) -> Returned:
     if errors[1] > REPEATS:
         periods += _check_repeats(of, x, v, s + closing, left)
     return Returned(x, v, records[-1], periods, left, newton=False)
+
+
+def _product(of: Turns, record: Record) -> tuple[Array | None, float]:
+    """The derivative of the map along the motion of a period, from those of few steps, and the periods that it takes; None
+    where it costs more than it saves, and as `product_of_steps` does."""
+    if of.rows % SAMPLES or periods_of_product(of) > DEAR:
+        return None, 0.0
+    return product_of_steps(of, record), periods_of_product(of)
+
+
+def _rounding(of: Turns) -> float:
+    """What rounding of places leaves open where there are many of the fastest vibration in a period, whose rates it makes."""
+    fastest = max((float(body.model.omega2.max(initial=0.0)) for body in of.system.scene.bodies), default=0.0) ** 0.5
+    return max(RETURNS, CLOSED * fastest * of.period)
 
 
 def _brought_back(M: Array, closing: Array) -> Array:
@@ -206,17 +221,21 @@ def _check_repeats(of: Turns, x: Array, v: Array, image: Array, error: float) ->
 
 def _by_newton(of: Turns, known: _Known, periods: float) -> Returned:
     """From the point that leaves least open."""
-    scale, left = of.scale, np.inf
+    scale, left, quick = of.scale, np.inf, True
     s = known.points[int(np.argmin([_largest(one) for one in known.closings]))]
     for _ in range(NEWTONS):
         x, v = placed(of, s * scale)
         record = after(of, x, v, rows=of.rows)
         image = deviation(of, record.x[-1], record.v[-1]) / scale
-        periods, left = periods + 1, _largest(image - s)
-        if left <= RETURNS:
+        before, left, periods = left, _largest(image - s), periods + 1
+        falls = left <= HALVED * before
+        if left <= RETURNS or (left <= _rounding(of) and not falls):
             return Returned(x, v, record, periods + _check_repeats(of, x, v, image, left), left, newton=True)
-        M = monodromy(of, s * scale)
-        periods += 4 * s.size
+        quick = quick and falls
+        M, cost = _product(of, record) if quick else (None, 0.0)
+        if M is None:
+            M, cost = monodromy(of, s * scale), cost + 4 * s.size
+        periods += cost
         s = s + np.linalg.lstsq(np.eye(s.size) - M, image - s, rcond=1e-10)[0]
     raise ComputationError(
         f"no motion of period {of.period:.6g} s was found: after {NEWTONS} of Newton's steps a period still ends {left:.2g} "

@@ -6,10 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from synthetic import cloud
 from test_dyn_plane import slider_crank
 
 import ffr_dyn as fd
 from ffr_dyn.consistency.assemble import assemble
+from ffr_dyn.linear import returning
 from ffr_dyn.linear.returning import returned
 from ffr_dyn.linear.step_tangents import _trigonometric, product_of_steps
 from ffr_dyn.linear.turn_map import Turns, after, monodromy, period_of, placed, turns, turns_about
@@ -67,3 +69,23 @@ def test_steps_that_change_abruptly_are_no_smooth_function_of_time():
     assert product_of_steps(of, after(of, found.x, found.v, rows=of.rows)) is None
     assert found.record.x[:, 0].max() > 0.02
     np.testing.assert_allclose(found.record.x[-1], found.x, atol=1e-9)
+
+
+def test_newtons_method_takes_it_where_mixing_stalls_by_rounding(monkeypatch):
+    """Hundreds of undamped vibrations in a period, whose rates are known no better; by whole periods it took a minute."""
+    monkeypatch.setattr(returning, "monodromy", lambda *_: pytest.fail("periods by differences"))
+    body = cloud(6, stiffness=3000.0)
+    scene = fd.Scene(
+        (fd.Body("arm", body),),
+        (fd.Joint("hinge", "revolute", "ground.O", "arm.a", axis=(0.3, 0.2, 1.0)),),
+        drivers=(fd.Driver("motor", "hinge", fd.harmonic(amplitude=0.3, frequency=2.0)),),
+        loads=(fd.Load("side", "arm.c", force=(0, 1.0, 0.5)),),
+        ground={"O": (0, 0, 0)},
+        gravity=(0, -9.81, 0),
+    )
+    assembled = assemble(scene)
+    of = turns(assembled.system, 0.0, assembled.x, assembled.v, fd.ROS3(0.5 / 4000), 0.5)
+    found = returned(of)
+    assert found.newton
+    again = after(of, found.x, found.v)
+    np.testing.assert_allclose(again.x[-1], found.x, atol=1e-9)
