@@ -84,7 +84,7 @@ def test_newtons_method_takes_it_where_mixing_stalls_by_rounding(monkeypatch):
         gravity=(0, -9.81, 0),
     )
     assembled = assemble(scene)
-    of = turns(assembled.system, 0.0, assembled.x, assembled.v, fd.ROS3(0.5 / 4000), 0.5)
+    of = turns(assembled.system, 0.0, assembled.x, assembled.v, fd.ROS3(0.5 / 8000), 0.5)
     found = returned(of)
     assert found.newton
     again = after(of, found.x, found.v)
