@@ -51,6 +51,8 @@ def stressed_bodies(result: Result) -> tuple[str, ...]:
     """The bodies of the result that have stress modes; InputError when none has."""
     modes = {name: surface.stress for name, surface in with_wholes(result).geometry.items()}
     names = tuple(name for name, stress in modes.items() if stress is not None and stress.shape[2] > 0)
+    if not names and result.attributes.get("analysis") == "kinematic":
+        raise InputError("a kinematic analysis takes bodies as undeformed, without stress; `inverse` deforms them")
     if not names:
         raise InputError(
             "no body of the result has stress modes; reduce it again with them (ffr-prep reduce --stress, "

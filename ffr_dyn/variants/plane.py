@@ -100,7 +100,7 @@ def obstacles(scene: Scene) -> tuple[str, tuple[str, ...]]:
 def _in_plane(scene: Scene, normal: int) -> Scene:
     bodies, kept = [], {}
     for body in scene.bodies:
-        made = altered(body, kept=((), 0))
+        made = altered(body, kept=body.kept or ((), 0))
         if body.model.n:
             made, kept[body.name] = _body_in_plane(body, body_normal(body, normal), used_interfaces(scene, body))
         bodies.append(made)

@@ -18,7 +18,7 @@ from ffr_dyn.consistency.mobility import mobility, undeformed
 from ffr_dyn.functions.time_functions import polynomial, table
 from ffr_dyn.integrators import RK4
 from ffr_dyn.scene.drivers import Driver, PointDriver
-from ffr_dyn.scene.forces import ModalForce
+from ffr_dyn.scene.forces import Load, ModalForce
 from ffr_dyn.scene.joints import Joint
 from ffr_dyn.scene.scene import Body, Scene
 from ffr_prep.body import rigid_body
@@ -150,6 +150,22 @@ def test_a_flexible_rod_takes_nothing_from_the_freedom_of_the_crank():
     assert (driven.rigid, driven.degrees_of_freedom) == (0, rod.n - 3)
     with pytest.raises(InputError, match=r"nothing holds the motion .* \(1 rigid degree of freedom"):
         static(scene)
+
+
+def test_forces_that_read_elastic_coordinates_read_zeros_of_undeformed_bodies():
+    """In the plane and in space: a rod that a driver turns carries a force of 2 N + 3 N/(m sqrt(kg)) q[1] across its tip."""
+    scene = hinged_slider_crank()
+    rod = scene.bodies[1]
+    read = Load("read", "rod.b", function=lambda t, state: [0, 2 + 3 * state.q("rod")[0], state.q_dot("rod")[0]])
+    plain = Load("plain", "rod.b", force=(0, 2.0, 0))
+    for plane in ("auto", "none"):
+        efforts = [
+            kinematic(replace(scene, drivers=(MOTOR,), loads=(load,), plane=plane), end=0.2, output_step=0.1)
+            for load in (read, plain)
+        ]
+        np.testing.assert_allclose(efforts[0]["motor.effort"], efforts[1]["motor.effort"], rtol=1e-13)
+        assert efforts[0]["rod.q"].shape == (3, rod.model.n)
+        assert not efforts[0]["rod.q"].any()
 
 
 def test_mobility_of_a_free_flexible_body():

@@ -18,6 +18,9 @@ from remedy import CLOUD, HINGED, command, run, stressed
 from said import Case
 from synthetic import cloud
 
+from ffr_dyn.analyses.inverse import inverse
+from ffr_dyn.analyses.kinematic import kinematic
+from ffr_dyn.functions.time_functions import polynomial
 from ffr_dyn.integrators import ROS2
 from ffr_dyn.pictures.animate import animate
 from ffr_dyn.pictures.film import Camera, film
@@ -27,6 +30,7 @@ from ffr_dyn.realtime.deadline import measure_steps
 from ffr_dyn.results.file import ResultWriter, load_result, save_result
 from ffr_dyn.results.result import Axis, Quantity, Result
 from ffr_dyn.results.stress import hot_spots, peaks, section_forces, stressed_surface, tensors
+from ffr_dyn.scene.drivers import Driver
 from ffr_dyn.scene.scene import Body, Scene
 from ffr_dyn.scene.sensors import SectionMeasurement, StressMeasurement
 from ffr_dyn.scene.stress_sensors import measure
@@ -138,6 +142,10 @@ def anisotropic() -> FlexibleBody:
     return replace(MODEL, surface=replace(MODEL.surface, moduli=0 * MODEL.surface.moduli))
 
 
+def driven() -> Scene:
+    return scene(MODEL, drivers=(Driver("motor", "hinge", polynomial(0, 1.0)),))
+
+
 AT = StressMeasurement("s", "cloud", CORNER)
 SECTION = SectionMeasurement("s", "cloud", CORNER)
 STRESS = [
@@ -155,6 +163,8 @@ STRESS = [
     Case(lambda: sensed(replace(AT, point=(900.0, 0, 0))), lambda: sensed(AT)),
     Case(lambda: sensed(AT, cloud(2)), lambda: sensed(AT)),
     Case(lambda: sensed(SECTION, stressed(cloud(2))), lambda: sensed(SECTION)),
+    Case(lambda: hot_spots(kinematic(driven(), end=0.02, output_step=0.01)),
+         lambda: hot_spots(inverse(driven(), end=0.02, output_step=0.01))),
 ]  # fmt: skip
 
 # ---- pictures -----------------------------------------------------------------------------------------------------------
