@@ -20,6 +20,7 @@ from ffr_dyn.consistency.assemble import Assembled
 from ffr_dyn.consistency.evaluation import evaluate, evaluator
 from ffr_dyn.consistency.explicit_forces import candidates, fastest, told
 from ffr_dyn.consistency.following import beyond_one, jump_of, row_named, torn_open, unfollowed
+from ffr_dyn.consistency.unshown_loads import energies, left_out
 from ffr_dyn.consistency.validity import extremes, meaningless, strained, unstiffened
 from ffr_dyn.equations.inertia import kept_integrals, mass_matrix
 from ffr_dyn.equations.state_view import StateView
@@ -68,12 +69,13 @@ TABLE: dict[str, dict[str, str]] = {
     "deformed beyond the theory": _verdicts(NOTE, NOTE, NONE, NOTE, NOTE),
     "deformed beyond any meaning": _verdicts(ERROR, NOTE, NONE, ERROR, ERROR),
     "spin without stiffening": _verdicts(NOTE, NOTE, NONE, NONE, NOTE),
+    "deformation that the shapes leave out": _verdicts(NOTE, NOTE, NONE, NOTE, NONE),
     "singular position": _verdicts(NOTE, NOTE, NOTE, NONE, NONE),
     "mass matrix nearly singular": _verdicts(NOTE, NOTE, NONE, NOTE, NOTE),
     "kink of a force": _verdicts(NONE, NONE, NONE, NONE, NONE) | {"linearise": NOTE},
 }
 OPEN, APART, ASTRAY, QUICK, SUDDEN, _, BALANCE, STIFF, WOUND, WRAPPED, *_REST = TABLE
-STRAINED, MEANINGLESS, SPUN, SINGULAR, MASS, KINK = _REST
+STRAINED, MEANINGLESS, SPUN, UNSHOWN, SINGULAR, MASS, KINK = _REST
 
 MET = 1e-8  # m, -: of constraints that Newton's method closes
 KEPT = 10.0  # times the tolerance of a projection
@@ -93,7 +95,8 @@ class Seen:
 
     method    : of its steps; None where it has none
     tolerance : that constraints are to be met with [m, -];  apart : from where a mechanism has come apart
-    arrays    : "bodies" (4, B) as `ffr_dyn.consistency.validity.extremes`; "open" (3,) the largest constraint left open, its
+    arrays    : "bodies" (4, B) as `ffr_dyn.consistency.validity.extremes`; "unshown" (3, B) as
+                `ffr_dyn.consistency.unshown_loads.energies`; "open" (3,) the largest constraint left open, its
                 time, its number; "driven" (2, D) of each driver the largest difference from what it prescribes, and its
                 largest second derivative; "told" (4, C) a derivative that a Python function of time tells and has not, of
                 order 0 where there is none; "torn" (3, A) of each angle that a formula of a force reads the last, whether the
@@ -118,7 +121,12 @@ def nothing_seen(
 ) -> Seen:
     """Before the first row."""
     scene = assembled.system.scene
-    sizes = {"bodies": (4, len(scene.bodies)), "open": (3,), "driven": (2, len(scene.drivers))}
+    sizes = {
+        "bodies": (4, len(scene.bodies)),
+        "unshown": (3, len(scene.bodies)),
+        "open": (3,),
+        "driven": (2, len(scene.drivers)),
+    }
     sizes |= {"told": (4, len(assembled.system.user.callbacks))}
     sizes |= {"torn": (3, len(_read_angles(assembled.system)))}
     sizes |= {"rates": (len(forces_of(scene)),), "wound": (len(forces_of(scene)),), "x": (assembled.x.size,)}
@@ -145,6 +153,8 @@ def look(seen: Seen, view: View) -> None:
     system, rows, arrays = seen.assembled.system, view.record, seen.arrays
     check_repeats(system.user, rows.time, rows.x, rows.v)
     arrays["bodies"][:] = np.maximum(arrays["bodies"], extremes(system, rows))
+    found = energies(view)
+    arrays["unshown"][:] = np.where(found[0] > arrays["unshown"][0], found, arrays["unshown"])
     arrays["x"][:] = rows.x[-1]
     worst = int(np.argmax(rows.violation[:, 0]))
     if rows.violation[worst, 0] > max(seen.tolerance, arrays["open"][0]):
@@ -290,6 +300,7 @@ def _found(seen: Seen) -> dict[str, list[str]]:
         STRAINED: strained(scene, turned, deflected, stretched),
         MEANINGLESS: [lost] if lost else [],
         SPUN: unstiffened(scene, spun),
+        UNSHOWN: list(left_out(scene, seen.arrays["unshown"])),
         MASS: list(_dependent(seen.assembled.system, seen.arrays["x"])),
     }
 

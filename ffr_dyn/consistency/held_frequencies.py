@@ -103,7 +103,8 @@ def _reference(scene: Scene, body: Body, blocks: list[Block]) -> FlexibleBody | 
 def _lowest(scene: Scene, b: int, model: FlexibleBody, blocks: list[Block], plane: str, time: float) -> float:
     """The lowest frequency [Hz] of body b with a model, all others at rest; of motions in the plane, if there is one."""
     body = replace(scene.bodies[b], model=model, q=None, q_dot=None, damping=0.0, dropped=(), kept=None)
-    scene = replace(scene, bodies=(*scene.bodies[:b], body, *scene.bodies[b + 1 :]), forces=(), loads=(), springs=())
+    bodies = (*scene.bodies[:b], body, *scene.bodies[b + 1 :])
+    scene = replace(scene, bodies=bodies, forces=(), loads=(), springs=(), measurements=())
     place = layout(scene)
     own = slice(place.iv[b], place.iv[b] + 6 + model.n)
     rows = np.array([row.jacobian[own] for row in rows_at(scene, place, blocks, *initial_state(scene, place), time)])

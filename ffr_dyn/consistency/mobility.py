@@ -96,8 +96,8 @@ def undeformed(scene: Scene) -> Scene:
 
 def _rigid(body: Body) -> Body:
     """Whose elastic coordinates, for those who ask, are zero."""
-    rest = {"q": None, "q_dot": None, "damping": 0.0, "stiffening": False, "frame": None}
-    return replace(body, model=truncated(body.model, 0), kept=((), body.model.n), **rest)
+    rigid = replace(body, model=truncated(body.model, 0), q=None, q_dot=None, damping=0.0, stiffening=False, frame=None)
+    return replace(rigid, kept=((), body.model.n))
 
 
 def rigid_freedom(scene: Scene, assembled: Assembled, time: float) -> int:

@@ -114,8 +114,18 @@ def applied_by(now: At, load: Force) -> Applied:
         if len(rows) == 1:
             coordinate, rate = rows[0].Phi, rows[0].nu
         force = load.law(now, coordinate, rate)
-        generalised = np.ravel(force) @ np.array([row.jacobian for row in rows])
+        generalised = _along(rows, force)
     return Applied(load.name, generalised, float(generalised @ now.velocities), coordinate, force)
+
+
+def acting(now: At, place: Place, force: Array) -> Array:
+    """(V,) generalised forces of a force on the coordinates of a place, or of a force and moment (6,) at a marker."""
+    return _wrench(now, place, force) if isinstance(place, AtMarker) else _along(_coordinates(now, place), force)
+
+
+def _along(rows: list[Row], force: Any) -> Array:
+    generalised: Array = np.ravel(force) @ np.array([row.jacobian for row in rows])
+    return generalised
 
 
 def _wrench(now: At, place: AtMarker, values: Array) -> Array:

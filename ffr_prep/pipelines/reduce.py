@@ -258,7 +258,7 @@ def _doubts(
 
 def _with_held_body(made: FlexibleBody, model: Model, body: FreeBody, progress: Stages) -> FlexibleBody:
     """The body with how it would vibrate with its interfaces held, where its own shapes cannot tell."""
-    if model.massless or not needs_held_body(made):
+    if model.massless or not needs_held_body(made, model.coupled, body):
         return made
     progress("look at the interfaces held")
     held = held_body(model.coupled, body, model.inertia)

@@ -39,6 +39,7 @@ from ffr_prep.common.errors import InputError
 
 LEVEL = 5e-10  # m, that points of a plane may be apart along its normal
 COORDINATE, RATE, FORCE = range(3)  # columns recorded of a force on one coordinate
+SIX = slice(12, 18)  # those of the force on six coordinates
 
 
 @dataclass(frozen=True)
