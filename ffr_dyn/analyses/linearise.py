@@ -28,6 +28,7 @@ from ffr_dyn.compile.structure import Structure
 from ffr_dyn.consistency.assemble import assemble, seen_in_space
 from ffr_dyn.consistency.doubts import KINK, checked
 from ffr_dyn.consistency.evaluation import Evaluator, evaluate, evaluator
+from ffr_dyn.consistency.held_frequencies import beyond_modes
 from ffr_dyn.consistency.kinks import check_sizes, held_by_nothing, kinked_forces
 from ffr_dyn.consistency.tangent import STEP, Chart, at_rest, chart, derivative, rates, sizes, state, state_matrix
 from ffr_dyn.equations.forces import At
@@ -209,7 +210,8 @@ def linearise(
     >>> found = fd.linearise(scene, inputs=(fd.JointEffort("torque", "hinge"),), outputs=("rod.tip.position.y",))
     """
     found = linearised(scene, time, inputs, outputs)
-    return replace(found, notes=(*found.notes, *_of_this_moment(found, scene, inputs)))
+    highest = float(np.abs(found.eigenvalues.imag).max(initial=0.0)) / (2 * np.pi)
+    return replace(found, notes=(*found.notes, *_of_this_moment(found, scene, inputs), *beyond_modes(scene, highest)))
 
 
 def linearised(

@@ -1,4 +1,5 @@
-"""Whether the modes of a body vibrate as its joints let it: its lowest frequency with the joints held, and what it should be.
+"""Whether the modes of a body vibrate as its joints let it: its lowest frequency with the joints held, and what it should be;
+and up to where they are enough of them, by the error that the reduction has found of its frequencies.
 
 Both are of the body alone, all others at rest, undeformed. What it should be comes from the small body that a reduction keeps
 beside a basis that does not hold the static shapes of its interfaces (`ffr_prep.reduction.held_body`).
@@ -17,13 +18,14 @@ from ffr_dyn.equations.inertia import mass_matrix
 from ffr_dyn.equations.layout import initial_state, layout
 from ffr_dyn.scene.drivers import Driver
 from ffr_dyn.scene.scene import Body, Scene, joints_of
-from ffr_prep.body import FlexibleBody, Interface
+from ffr_prep.body import TRUNCATION_ERROR, FlexibleBody, Interface, errors_of_modes
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.in_words import settings_in_words
 
 HELD = "held_body"  # of the provenance
 APART = 0.03  # relative difference of frequencies, beyond which it is told
 STILL = 1e-6  # of a squared frequency, relative to the lowest of the body, below which a motion is rigid
+MOST = 3  # bodies that are named
 AXES = "xyz"
 
 
@@ -49,6 +51,25 @@ def held_frequencies(scene: Scene, poses: Iterable[tuple[Array, Array]], plane: 
             if abs(has - should) > APART * should:
                 notes.append(_told(body, [block.name for block in blocks], has, should))
     return notes
+
+
+def beyond_modes(scene: Scene, highest: float) -> list[str]:
+    """A note on bodies whose vibrations are too fast by more than APART somewhere up to a frequency [Hz], as their reduction
+    has left out shapes that they need."""
+    found = []
+    for body in scene.bodies:
+        wrong = [(k, e) for k, e in errors_of_modes(body.model.provenance, TRUNCATION_ERROR).items() if e > APART]
+        for k, error in wrong[:1]:
+            has = float(body.model.frequencies[k - 1])
+            found += [(has / (1 + error), f"mode {k} of {body.name!r}, of {has:.4g} Hz, by {100 * error:.2g} %")]
+    found = sorted((one for one in found if one[0] <= highest), key=lambda one: one[0])
+    if not found:
+        return []
+    more = f", and modes of {len(found) - MOST} other bodies" if len(found) > MOST else ""
+    return [
+        f"from about {found[0][0]:.4g} Hz on vibrations are too fast, for want of shapes: under their reference conditions "
+        f"{', '.join(text for _, text in found[:MOST])}{more}; keep more modes"
+    ]
 
 
 def _told(body: Body, joints: list[str], has: float, should: float) -> str:

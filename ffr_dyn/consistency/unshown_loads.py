@@ -25,7 +25,10 @@ from ffr_dyn.scene.scene import Scene, marker_number, markers
 from ffr_prep.body import FlexibleBody, interface_motions, mass_of_motions, remembered
 from ffr_prep.common.arrays import Array
 
-TOLD, OF_STRESS = 0.05, 0.01  # of the strain energy, from which on it is told; of bodies with stress, which is off by its root
+TOLD, OF_STRESS = (
+    0.05,
+    0.01,
+)  # of the strain energy, from which on it is told; of bodies with stress, which is off by its root
 
 
 @dataclass(frozen=True)

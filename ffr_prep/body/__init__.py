@@ -19,7 +19,16 @@ from ffr_prep.body.fewer_modes import CUT_PAIR, KEPT, cut_pair, cut_twins, paire
 from ffr_prep.body.file import MAKE_AGAIN, content_hash, load_body, save_arrays, save_body, surface_arrays, surface_of
 from ffr_prep.body.frame_change import interface_motions, mass_of_motions
 from ffr_prep.body.mean_axis import FrameMarker, MeanAxisForm, idle_loads, mean_axis_form, mean_axis_surface
-from ffr_prep.body.mesh_error import CONVERTED_FROM, MESH_ERROR, made_of_plates, mesh_doubt, mesh_errors_of
+from ffr_prep.body.mesh_error import (
+    CONVERTED_FROM,
+    MESH_ERROR,
+    TRUNCATION_ERROR,
+    errors_of_modes,
+    made_of_plates,
+    mesh_doubt,
+    mesh_errors_of,
+    modes_doubt,
+)
 from ffr_prep.body.movable import immovable, least_inertia
 from ffr_prep.body.reduced import (
     SECTION_FORCES,
@@ -69,6 +78,7 @@ __all__ = [
     "SECTION_FORCES",
     "STEADY_STRESS",
     "TENSOR",
+    "TRUNCATION_ERROR",
     "WITHOUT_SHEAR",
     "BeamForces",
     "BodyError",
@@ -95,6 +105,7 @@ __all__ = [
     "damped",
     "damping_ratio",
     "displacements",
+    "errors_of_modes",
     "free_vibrations",
     "idle_loads",
     "immovable",
@@ -110,6 +121,7 @@ __all__ = [
     "mean_axis_surface",
     "mesh_doubt",
     "mesh_errors_of",
+    "modes_doubt",
     "of_fewer_shapes",
     "of_plane",
     "pair_values",

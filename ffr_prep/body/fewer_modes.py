@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ffr_prep.body.constructors import recombined
-from ffr_prep.body.mesh_error import CONVERTED_FROM, MESH_ERROR, mesh_errors_of
+from ffr_prep.body.mesh_error import CONVERTED_FROM, MESH_ERROR, TRUNCATION_ERROR, errors_of_modes
 from ffr_prep.body.reduced import BodyError, FlexibleBody
 from ffr_prep.body.steady_stress import of_fewer_shapes
 from ffr_prep.common.arrays import Array
@@ -54,11 +54,13 @@ def truncated(body: FlexibleBody, modes: int | Array) -> FlexibleBody:
 
 def _of_modes(provenance: Mapping[str, Any], keep: Array) -> Mapping[str, Any]:
     """With what is known of single modes under the numbers that these have among those that are kept."""
-    known = mesh_errors_of(provenance)
-    found = {new + 1: known[int(old) + 1] for new, old in enumerate(keep) if int(old) + 1 in known}
-    if not known or CONVERTED_FROM in provenance:  # whose modes are others than those that are told of
+    if CONVERTED_FROM in provenance:  # whose modes are others than those that are told of
         return provenance
-    return {**provenance, MESH_ERROR: {"modes": list(found), "too_high": list(found.values())}}
+    for kind in (MESH_ERROR, TRUNCATION_ERROR):
+        if known := errors_of_modes(provenance, kind):
+            found = {new + 1: known[int(old) + 1] for new, old in enumerate(keep) if int(old) + 1 in known}
+            provenance = {**provenance, kind: {"modes": list(found), "too_high": list(found.values())}}
+    return provenance
 
 
 def _with_cut_pair(provenance: Mapping[str, Any], body: FlexibleBody, modes: int | Array) -> Mapping[str, Any]:

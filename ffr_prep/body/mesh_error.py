@@ -1,11 +1,12 @@
-"""How much too high the frequencies of a body are by the size of its elements, as a reduction keeps it with the body."""
+"""How much too high the frequencies of a body are by the size of its elements, and by the shapes that its reduction leaves
+out, as a reduction keeps it with the body."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from typing import Any
 
-MESH_ERROR = "mesh_error"  # of the provenance
+MESH_ERROR, TRUNCATION_ERROR = "mesh_error", "truncation_error"  # of the provenance
 CONVERTED_FROM = (
     "converted_from"  # of the provenance: the reference conditions under which a converted body was reduced
 )
@@ -23,7 +24,12 @@ def mesh_errors_of(provenance: Mapping[str, Any]) -> dict[int, float]:
 
     Of a converted body they are the modes under the reference conditions of its reduction.
     """
-    kept = provenance.get(MESH_ERROR, {"modes": [], "too_high": []})
+    return errors_of_modes(provenance, MESH_ERROR)
+
+
+def errors_of_modes(provenance: Mapping[str, Any], kind: str) -> dict[int, float]:
+    """As `mesh_errors_of`, of either kind."""
+    kept = provenance.get(kind, {"modes": [], "too_high": []})
     return dict(zip(kept["modes"], kept["too_high"], strict=True))
 
 
@@ -37,6 +43,17 @@ def mesh_doubt(provenance: Mapping[str, Any]) -> str | None:
     remedy = ", and ".join(remedies or _FINER.values())
     before = ", under the reference conditions of its reduction," if CONVERTED_FROM in provenance else ""
     return f"its mesh is too coarse: the lowest frequency{before} is about {percent} % too high; {remedy}"
+
+
+def modes_doubt(provenance: Mapping[str, Any]) -> str | None:
+    """The warning about a body whose lowest frequency is too high for want of shapes; None where it is not."""
+    first = errors_of_modes(provenance, TRUNCATION_ERROR).get(1, 0.0)
+    if first < TOLD:
+        return None
+    return (
+        f"its shapes are too few: the lowest frequency under its reference conditions is about {100 * first:.2g} % too high; "
+        "keep more modes (`--modes`)"
+    )
 
 
 def made_of_plates(provenance: Mapping[str, Any]) -> bool:

@@ -19,6 +19,7 @@ from ffr_prep.body import (
     cut_error,
     cut_stress_doubt,
     mesh_doubt,
+    modes_doubt,
     shear_doubt,
     steady_stress_doubt,
     units_doubts,
@@ -41,6 +42,7 @@ from ffr_prep.reduction.quality import assess, completed
 from ffr_prep.reduction.second_order import check_size, with_second_order
 from ffr_prep.reduction.selection import Band
 from ffr_prep.reduction.steady_stress import steady_stress
+from ffr_prep.reduction.truncation_error import truncation_error
 from ffr_prep.solvers.factor import CHOLESKY, FreeBody, Solver, SupportedBody, solve_refined, supported
 from ffr_prep.solvers.threads import on_one_thread
 
@@ -201,6 +203,8 @@ def _reduced(model: Model, request: Request, progress: Stages, advance: Advance)
     check_basis(coupled, L, basis)
     progress("estimate the error of the mesh")
     of_mesh = mesh_error(model, basis)
+    held = supported(body, L) if basis.omega2.size else None
+    of_shapes = truncation_error(coupled, held, basis) if held and not model.massless else {}
     if request.quality:
         progress("compare with the full model")
     assessed = assess(coupled, body, L, basis, request.quality) if request.quality else None
@@ -214,23 +218,22 @@ def _reduced(model: Model, request: Request, progress: Stages, advance: Advance)
     if request.stress and surface is None:
         raise InputError("no part of this model knows its stress: reduce it without")
     stiffening = None
-    if basis.omega2.size and not (request.linear or model.unstressed):
+    if held and not (request.linear or model.unstressed):
         check_size(basis.omega2.size, len(coupled.names), surface, request.drawn_modes)
-        held = supported(body, L)
         progress("compute the load matrices")
         stiffening = stiffening_matrices(model, request, held, basis)
         if surface is not None:
             progress("compute the second order of the surface")
             drawn = replace(basis, Z=basis.Z[:, : request.drawn_modes], omega2=basis.omega2[: request.drawn_modes])
             surface = with_second_order(surface, model, held, request.reference, drawn, advance)
-    doubts = _doubts(model, basis, of_mesh, of_stress, stress=request.stress)
+    doubts = _doubts(model, basis, of_mesh | of_shapes, of_stress, stress=request.stress)
     made = FlexibleBody(
         name=request.name,
         omega2=basis.omega2,
         interfaces=interface_shapes(coupled, basis),
         surface=surface,
         stiffening=stiffening,
-        provenance=completed(record(model, request, doubts) | of_mesh | of_stress, basis, assessed),
+        provenance=completed(record(model, request, doubts) | of_mesh | of_shapes | of_stress, basis, assessed),
         damping=model.damping(basis.Z),
         **vars(integrals),
     )
@@ -244,11 +247,12 @@ def _with_doubts(made: FlexibleBody) -> FlexibleBody:
 
 
 def _doubts(
-    model: Model, basis: Basis, of_mesh: Mapping[str, Any], of_stress: Mapping[str, Any], *, stress: bool
+    model: Model, basis: Basis, of_modes: Mapping[str, Any], of_stress: Mapping[str, Any], *, stress: bool
 ) -> list[str]:
     """What model, mesh and shapes cannot be trusted with, in words."""
     found = [
-        mesh_doubt({**model.record, **of_mesh}),
+        mesh_doubt({**model.record, **of_modes}),
+        modes_doubt(of_modes),
         sheet_doubt(model.record, model.coupled, basis.Z),
         steady_stress_doubt(of_stress),
         shear_doubt(model.record) if stress else None,

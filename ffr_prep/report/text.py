@@ -13,10 +13,11 @@ from ffr_prep.body import (
     CUT_ERROR,
     MESH_ERROR,
     STEADY_STRESS,
+    TRUNCATION_ERROR,
     FlexibleBody,
     cut_errors_of,
+    errors_of_modes,
     made_of_plates,
-    mesh_errors_of,
 )
 from ffr_prep.body.interface_freedom import interface_freedom
 from ffr_prep.common.arrays import Array
@@ -32,7 +33,7 @@ _MOST_NAMES = 20
 _MOST_INTERFACES = 24
 _CLOSE = 0.01
 _NOISE = 1e-6
-_UNFELT = 1e-4  # of a frequency
+_UNFELT, _NONE = 1e-4, 1e-9  # of a frequency: what is not told, and what is rounding
 _DRAWN = ("outline", "shear")
 
 
@@ -61,7 +62,7 @@ def body_lines(body: FlexibleBody) -> Iterator[str]:
     yield from _region_lines(body.provenance)
     yield from _choice_lines(body.provenance)
     yield from mode_lines(body)
-    yield from mesh_error_lines(body.provenance)
+    yield from frequency_error_lines(body.provenance)
     yield from damping_lines(body)
     yield from verification_lines(body.provenance)
     yield from integral_lines(body)
@@ -79,7 +80,7 @@ def short_lines(body: FlexibleBody) -> Iterator[str]:
     if body.n:
         shown = ", ".join(f"{f:.4g}" for f in body.frequencies[:6])
         yield f"modes       {body.n}: {shown}{', ...' if body.n > 6 else ''} Hz"
-    yield from mesh_error_lines(body.provenance)
+    yield from frequency_error_lines(body.provenance)
     yield from damping_lines(body)
     yield from part_lines(body)
     yield from quality_lines(body)
@@ -166,13 +167,15 @@ def mode_lines(body: FlexibleBody) -> Iterator[str]:
     yield f"{'sum':>7}  {'':15}  " + " ".join(f"{total:7.2f}" for total in shares.sum(axis=0))
 
 
-def mesh_error_lines(provenance: Mapping[str, Any]) -> Iterator[str]:
-    """How much too high the frequencies are by the size of the elements, as far as that is known."""
-    if errors := mesh_errors_of(provenance):
-        each = ", ".join(f"{_percent(error)} ({mode})" for mode, error in errors.items())
-        alone = "; of plates without their bending" if made_of_plates(provenance) else ""
-        before = " under the reference conditions of its reduction" if CONVERTED_FROM in provenance else ""
-        yield f"mesh error  frequencies too high by about {each}; in brackets the mode{before}{alone}"
+def frequency_error_lines(provenance: Mapping[str, Any]) -> Iterator[str]:
+    """How much too high frequencies are by the size of the elements and by the shapes left out, as far as that is known."""
+    before = " under the reference conditions of its reduction" if CONVERTED_FROM in provenance else ""
+    alone = "; of plates without their bending" if made_of_plates(provenance) else ""
+    for kind, label, limits in ((MESH_ERROR, "mesh error", alone), (TRUNCATION_ERROR, "modes error", "")):
+        errors = errors_of_modes(provenance, kind)
+        if any(error > _NONE for error in errors.values()):
+            each = ", ".join(f"{_percent(error)} ({mode})" for mode, error in errors.items())
+            yield f"{label:12}frequencies too high by about {each}; in brackets the mode{before}{limits}"
 
 
 def damping_lines(body: FlexibleBody) -> Iterator[str]:
@@ -313,6 +316,7 @@ def _origin_lines(provenance: Mapping[str, Any]) -> Iterator[str]:
             "normal_modes",
             "held_body",
             MESH_ERROR,
+            TRUNCATION_ERROR,
             STEADY_STRESS,
             CUT_ERROR,
             "regions",

@@ -22,6 +22,7 @@ from ffr_dyn.analyses.settings import MomentSettings
 from ffr_dyn.consistency.assemble import assemble, seen_in_space
 from ffr_dyn.consistency.doubts import checked
 from ffr_dyn.consistency.evaluation import evaluator, record_states
+from ffr_dyn.consistency.held_frequencies import beyond_modes
 from ffr_dyn.linear.prestrained import told
 from ffr_dyn.linear.spectrum import Spectrum, followed, spectrum
 from ffr_dyn.linear.speeds import at_speed, speed_list
@@ -369,6 +370,7 @@ def _as_result(
         *distinct(note for one in spectra for note in one.notes),
         *unstable,
         *told(worst, names[worst.mode]),
+        *beyond_modes(scene, float(np.abs(values.imag).max(initial=0.0)) / (2 * np.pi)),
     ]
     quantities = {
         "speed": Quantity(np.array(speeds), "rad/s", (), "of what turns"),

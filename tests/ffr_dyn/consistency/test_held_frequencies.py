@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import ffr_dyn as fd
 import ffr_prep as fp
 from ffr_dyn.consistency.assemble import assemble
 from ffr_dyn.consistency.mobility import mobility, undeformed
@@ -105,3 +106,31 @@ def test_fewer_modes_are_told_too_and_files_keep_what_it_takes(tmp_path):
     assert told(on_two_hinges(body)) == []
     assert told(vary(on_two_hinges(body), modes={"rod": range(2)}))
     assert "held_body" not in rod(FIXED, fp.CraigBampton(2)).provenance
+
+
+def test_vibrations_beyond_the_modes_of_a_body_are_told():
+    """Of a clamped bar 0.4 m long, 20 x 30 mm: its second bending in the stiff plane is at 953 Hz by a finer basis, and with
+    the static shapes of its ends and one mode at 1520 Hz."""
+    member = fp.Member(fp.rectangle(0.02, 0.03), fp.material("steel"), (0, 1, 0))
+    frame = fp.named(fp.polyline([(0, 0, 0), (0.4, 0, 0)], member, elements=16), root=(0, 0, 0), end=(0.4, 0, 0))
+    model = fp.from_frame(frame, [fp.InterfaceRegion("root"), fp.InterfaceRegion("end")])
+
+    def clamped(modes: int) -> Scene:
+        request = fp.Request(name="bar", reference=fp.FixedTo("root"), reduction=fp.CraigBampton(modes))
+        joints = (Joint("clamp", "fixed", "ground.O", "bar.root"),)
+        return Scene((Body("bar", fp.reduce(model, request), damping=0.01),), joints, ground={"O": (0, 0, 0)})
+
+    def beyond(notes) -> list[tuple[float, str, float, float]]:
+        said = re.compile(r"from about ([\d.]+) Hz .* mode (\d+) of 'bar', of ([\d.]+) Hz, by ([\d.]+) %")
+        found = [said.search(note) for note in notes]
+        return [(float(m[1]), int(m[2]), float(m[3]), float(m[4])) for m in found if m]
+
+    few, push = clamped(1), fd.MarkerEffort("push", "bar.end", direction=(0, 0, 1))
+    above = [(pytest.approx(953, abs=1), 4, 1520.0, 59.0)]
+    asked = {"input": push, "outputs": ["bar.end.position.z"]}
+    assert beyond(fd.linearise(few).notes) == above
+    assert beyond(fd.response(few, band_of=(10, 1000), **asked).attributes["notes"]) == above
+    assert beyond(fd.response(few, band_of=(10, 900), **asked).attributes["notes"]) == []
+    assert beyond(fd.response(clamped(6), band_of=(10, 1000), **asked).attributes["notes"]) == []
+    forced = fd.forced(few, amplitude=1.0, band_of=(990, 1000), **asked)
+    assert beyond(forced.attributes["notes"]) == above

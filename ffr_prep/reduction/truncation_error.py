@@ -1,0 +1,57 @@
+"""The error of the frequencies of a reduced body that comes from the shapes that it leaves out."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ffr_prep.body import TRUNCATION_ERROR
+from ffr_prep.common.arrays import Array
+from ffr_prep.model.coupled import CoupledModel
+from ffr_prep.reduction.basis import Basis
+from ffr_prep.solvers.factor import SupportedBody, solve_supported
+from ffr_prep.solvers.threads import product
+
+_CONVERGED = 1e-3  # of a residual over its inertia: the frequency is right to its square
+_NOTHING = 1e-16  # of the square of a unit vector: rounding
+
+
+def truncation_error(model: CoupledModel, held: SupportedBody, basis: Basis) -> dict[str, Any]:
+    """How much too high the frequencies of modes 1, 2, 4, 8 and so on are by the shapes left out, as JSON values.
+
+    A step of inverse iteration of each of these modes, y = omega^2 K^-1 M z under the reference conditions, joins the basis,
+    and Rayleigh's quotients in both together are nearly those of the whole model (Bathe, Finite Element Procedures 1996,
+    section 11.6). Modes of the model itself have none, and so do all modes of a body that has no further ones.
+    """
+    modes = [2**k for k in range(basis.omega2.size.bit_length())]
+    chosen = np.array(modes, int) - 1
+    better = _better(model, held, basis, chosen) if modes else basis.omega2
+    too_high = np.sqrt(basis.omega2[chosen] / better[chosen]) - 1.0
+    return {TRUNCATION_ERROR: {"modes": modes, "too_high": np.round(np.maximum(too_high, 0.0), 12).tolist()}}
+
+
+def _better(model: CoupledModel, held: SupportedBody, basis: Basis, chosen: Array) -> Array:
+    """(n,) the lowest Rayleigh quotients, as many as there are modes."""
+    Z, omega2 = basis.Z, basis.omega2
+    inertia = product(model.M, Z[:, chosen]) * omega2[chosen]
+    stiff = product(model.K, Z[:, chosen])
+    reactions = held.C.T @ np.linalg.lstsq(held.C.toarray().T, stiff - inertia, rcond=None)[0]
+    residuals = np.linalg.norm(stiff - inertia - reactions, axis=0)
+    doubtful = residuals > _CONVERGED * np.linalg.norm(inertia, axis=0)
+    loads, at = inertia[:, doubtful], chosen[doubtful]
+    Y = solve_supported(held, loads, np.zeros((held.C.shape[0], at.size)))[0]
+    Y = _beside(model, Z, Y)
+    coupling, own = (of.T @ product(model.K, Y) for of in (Z, Y))
+    found: Array = np.linalg.eigvalsh(np.block([[np.diag(omega2), coupling], [coupling.T, 0.5 * (own + own.T)]]))
+    return found[: omega2.size]
+
+
+def _beside(model: CoupledModel, Z: Array, Y: Array) -> Array:
+    """(Z, m) mass-orthonormal vectors of what Y have beside the basis."""
+    for _ in range(2):
+        Y = Y - Z @ (Z.T @ product(model.M, Y))
+    squares, V = np.linalg.eigh(Y.T @ product(model.M, Y))
+    there = squares > _NOTHING
+    new: Array = Y @ (V[:, there] / np.sqrt(squares[there]))
+    return new
