@@ -18,7 +18,7 @@ from ffr_dyn.equations.inertia import mass_matrix
 from ffr_dyn.equations.layout import initial_state, layout
 from ffr_dyn.scene.drivers import Driver
 from ffr_dyn.scene.scene import Body, Scene, joints_of
-from ffr_prep.body import TRUNCATION_ERROR, FlexibleBody, Interface, errors_of_modes
+from ffr_prep.body import CONVERTED_FROM, TRUNCATION_ERROR, FlexibleBody, Interface, errors_of_modes
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.in_words import settings_in_words
 
@@ -58,8 +58,9 @@ def beyond_modes(scene: Scene, highest: float) -> list[str]:
     has left out shapes that they need."""
     found = []
     for body in scene.bodies:
-        wrong = [(k, e) for k, e in errors_of_modes(body.model.provenance, TRUNCATION_ERROR).items() if e > APART]
-        for k, error in wrong[:1]:
+        known = errors_of_modes(body.model.provenance, TRUNCATION_ERROR)
+        wrong = [(k, error) for k, error in known.items() if error > APART]
+        for k, error in [] if CONVERTED_FROM in body.model.provenance else wrong[:1]:
             has = float(body.model.frequencies[k - 1])
             found += [(has / (1 + error), f"mode {k} of {body.name!r}, of {has:.4g} Hz, by {100 * error:.2g} %")]
     found = sorted((one for one in found if one[0] <= highest), key=lambda one: one[0])
@@ -70,6 +71,18 @@ def beyond_modes(scene: Scene, highest: float) -> list[str]:
         f"from about {found[0][0]:.4g} Hz on vibrations are too fast, for want of shapes: under their reference conditions "
         f"{', '.join(text for _, text in found[:MOST])}{more}; keep more modes"
     ]
+
+
+def in_a_band(scene: Scene, highest: float) -> list[str]:
+    """As `beyond_modes`, and a note on bodies that have no vibrations at all as fast as a band goes [Hz]."""
+    few = sorted((float(b.model.frequencies.max()), b.name) for b in scene.bodies if b.model.n)
+    few = [one for one in few if one[0] < highest]
+    found = beyond_modes(scene, highest)
+    if found or not few:
+        return found
+    named = ", ".join(f"those of {name!r} above {top:.4g} Hz" for top, name in few[:MOST])
+    more = f", and those of {len(few) - MOST} other bodies" if len(few) > MOST else ""
+    return [f"vibrations that no mode has are missing, {named}{more}; keep more modes"]
 
 
 def _told(body: Body, joints: list[str], has: float, should: float) -> str:

@@ -28,7 +28,7 @@ from ffr_dyn.scene.force_kinds import in_bases, modal_fields
 from ffr_dyn.scene.parts import owner
 from ffr_dyn.scene.scene import INERTIA_TERMS, Body, Scene, used_interfaces
 from ffr_dyn.variants.condensation import cut_of_shapes, statically_complete
-from ffr_prep.body import FlexibleBody, of_fewer_shapes, recombined, truncated, with_cut
+from ffr_prep.body import FlexibleBody, in_fewer_shapes, of_fewer_shapes, recombined, truncated, with_cut
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 
@@ -67,18 +67,18 @@ def _none(model: FlexibleBody) -> Array:
 
 def with_basis(model: FlexibleBody, V: Array) -> FlexibleBody:
     """The body in the elastic coordinates p, q = V p, for V (n, m) with V^T V = I and V^T Omega^2 V diagonal."""
-    stiffening = model.stiffening
+    stiffening, omega2 = model.stiffening, np.einsum("ia,i,ia->a", V, model.omega2, V)
     return replace(
         model,
         P_dm=model.P_dm @ V,
         rP_dm=model.rP_dm @ V,
         PP_dm=np.einsum("ia,klij,jb->klab", V, model.PP_dm, V, optimize=True),
-        omega2=np.einsum("ia,i,ia->a", V, model.omega2, V),
+        omega2=omega2,
         interfaces=tuple(replace(i, phi_t=i.phi_t @ V, phi_r=i.phi_r @ V) for i in model.interfaces),
         surface=model.surface and recombined(model.surface, V, model.surface.Phi @ V),
         stiffening=None if stiffening is None else np.einsum("ia,lij,jb->lab", V, stiffening, V, optimize=True),
         damping=None if model.damping is None else V.T @ model.damping @ V,
-        provenance=of_fewer_shapes(model, V),
+        provenance=in_fewer_shapes(of_fewer_shapes(model, V), model.omega2, omega2),
     )
 
 

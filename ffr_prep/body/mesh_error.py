@@ -6,6 +6,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
+
+from ffr_prep.common.arrays import Array
+
 MESH_ERROR, TRUNCATION_ERROR = "mesh_error", "truncation_error"  # of the provenance
 CONVERTED_FROM = (
     "converted_from"  # of the provenance: the reference conditions under which a converted body was reduced
@@ -43,6 +47,18 @@ def mesh_doubt(provenance: Mapping[str, Any]) -> str | None:
     remedy = ", and ".join(remedies or _FINER.values())
     before = ", under the reference conditions of its reduction," if CONVERTED_FROM in provenance else ""
     return f"its mesh is too coarse: the lowest frequency{before} is about {percent} % too high; {remedy}"
+
+
+def in_fewer_shapes(provenance: Mapping[str, Any], old: Array, new: Array) -> Mapping[str, Any]:
+    """The provenance of a body in fewer combinations of its shapes: what its frequencies are too high by for want of shapes,
+    by those that it had and those that it has; without, where they are in no order. old (n,), new (m,) : omega^2 [1/s^2]."""
+    known = {k: e for k, e in errors_of_modes(provenance, TRUNCATION_ERROR).items() if k <= len(new)}
+    if not known or CONVERTED_FROM in provenance:
+        return provenance
+    if (np.diff(old) < 0).any() or (np.diff(new) < 0).any():
+        return {key: of for key, of in provenance.items() if key != TRUNCATION_ERROR}
+    too_high = [float((new[k - 1] / old[k - 1]) ** 0.5 * (1.0 + error) - 1.0) for k, error in known.items()]
+    return {**provenance, TRUNCATION_ERROR: {"modes": list(known), "too_high": too_high}}
 
 
 def modes_doubt(provenance: Mapping[str, Any]) -> str | None:

@@ -203,6 +203,7 @@ def _reduced(model: Model, request: Request, progress: Stages, advance: Advance)
     check_basis(coupled, L, basis)
     progress("estimate the error of the mesh")
     of_mesh = mesh_error(model, basis)
+    progress("estimate the error of the modes")
     held = supported(body, L) if basis.omega2.size else None
     of_shapes = truncation_error(coupled, held, basis) if held and not model.massless else {}
     if request.quality:

@@ -21,7 +21,7 @@ from ffr_dyn.analyses.settings import MomentSettings
 from ffr_dyn.compile.scene_tables import given_at
 from ffr_dyn.consistency.assemble import assemble
 from ffr_dyn.consistency.evaluation import evaluator
-from ffr_dyn.consistency.held_frequencies import beyond_modes
+from ffr_dyn.consistency.held_frequencies import in_a_band
 from ffr_dyn.functions.time_functions import harmonic
 from ffr_dyn.integrators import ROS3
 from ffr_dyn.linear.continuation import Solution, branch, folds
@@ -149,7 +149,7 @@ def forced(
     found = list(branch(over_frequency(of, *band_of), first.u))
     motions = [_motion(of, acts, one, names) for one in found]
     said = {**told(acts, input, units, names), "input_amplitude": amplitude}
-    notes = (*notes, *beyond_modes(scene, max(band_of)))
+    notes = (*notes, *in_a_band(scene, max(band_of)))
     result = _as_result(scene, found, np.array(motions), names, harmonics, said, notes)
     if path is not None:
         save_result(result, path)

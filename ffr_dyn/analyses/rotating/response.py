@@ -19,7 +19,7 @@ from ffr_dyn.analyses.rotating.without_bound import grows, notes_of_gains, notes
 from ffr_dyn.analyses.settings import MomentSettings
 from ffr_dyn.analyses.states import scene_at
 from ffr_dyn.analyses.static import static
-from ffr_dyn.consistency.held_frequencies import beyond_modes
+from ffr_dyn.consistency.held_frequencies import in_a_band
 from ffr_dyn.linear.prescribed import prescribed
 from ffr_dyn.linear.transfer import Transfer, band, mean_square, transfer
 from ffr_dyn.results.file import save_result
@@ -164,7 +164,7 @@ def response(
         some = f[:: max(1, f.size // 50)]
         linear = replace(linear, notes=(*linear.notes, *beside(linear, sides, some, linear.outputs, acts.order or 0)))
     power, notes = _mean_square(linear, sides, noise, acts.order or 0)
-    notes = [*notes_of_gains(linear, found), *notes, *beyond_modes(scene, float(f.max()))]
+    notes = [*notes_of_gains(linear, found), *notes, *in_a_band(scene, float(f.max()))]
     linear = replace(linear, notes=(*linear.notes, *notes))
     result = _as_result(scene, linear, found, told(acts, input, units, linear.outputs), noise, power, time)
     if path is not None:

@@ -16,7 +16,7 @@ from ffr_dyn.scene.drivers import Driver
 from ffr_dyn.scene.joints import Joint
 from ffr_dyn.scene.scene import Body, Scene
 from ffr_dyn.variants.variant import vary
-from ffr_prep.body import load_body, rigid_body, save_body
+from ffr_prep.body import TRUNCATION_ERROR, errors_of_modes, load_body, rigid_body, save_body
 
 LENGTH, DIAMETER, E, RHO = 0.3, 0.006, 2e11, 7870.0
 UNIT = np.sqrt(E / RHO) * DIAMETER / 4 / LENGTH**2 / (2 * np.pi)  # Hz of a beam of unit constants
@@ -134,3 +134,18 @@ def test_vibrations_beyond_the_modes_of_a_body_are_told():
     assert beyond(fd.response(clamped(6), band_of=(10, 1000), **asked).attributes["notes"]) == []
     forced = fd.forced(few, amplitude=1.0, band_of=(990, 1000), **asked)
     assert beyond(forced.attributes["notes"]) == above
+    lacking = fd.response(fd.vary(few, modes=2), band_of=(10, 900), **asked).attributes["notes"]
+    (note,) = (one for one in lacking if "no mode" in one)
+    assert note == "vibrations that no mode has are missing, those of 'bar' above 156.8 Hz; keep more modes"
+
+
+def test_in_fewer_shapes_the_error_grows_by_what_the_frequency_does():
+    """Static shapes and two modes of a rod, of which few are kept: the first, or those that hinges use."""
+    body = rod(FIXED, fp.CraigBampton(2))
+    whole = rod(FIXED, fp.Eigenmodes(20)).frequencies
+    scene = on_two_hinges(body)
+    for modes in (2, 5, 8, range(4)):
+        model = vary(scene, modes={"rod": modes}).bodies[0].model
+        for k, error in errors_of_modes(model.provenance, TRUNCATION_ERROR).items():
+            true = model.frequencies[k - 1] / whole[k - 1] - 1
+            assert error == pytest.approx(true, rel=0.03, abs=1e-6) or 0.1 < error < true
