@@ -14,7 +14,7 @@ from ffr_prep.solvers.factor import SupportedBody, solve_supported
 from ffr_prep.solvers.threads import product
 
 _CONVERGED = 1e-3  # of a residual over its inertia: the frequency is right to its square
-_NOTHING = 1e-16  # of the square of a unit vector: rounding
+_NOTHING, _ONE = 1e-14, 0.5  # of the square of a unit vector: what is less is rounding
 
 
 def truncation_error(model: CoupledModel, held: SupportedBody, basis: Basis) -> dict[str, Any]:
@@ -49,9 +49,8 @@ def _better(model: CoupledModel, held: SupportedBody, basis: Basis, chosen: Arra
 
 def _beside(model: CoupledModel, Z: Array, Y: Array) -> Array:
     """(Z, m) mass-orthonormal vectors of what Y have beside the basis."""
-    for _ in range(2):
+    for least in (_NOTHING, _ONE):  # once more, as what is small in the first place is known with few digits
         Y = Y - Z @ (Z.T @ product(model.M, Y))
-    squares, V = np.linalg.eigh(Y.T @ product(model.M, Y))
-    there = squares > _NOTHING
-    new: Array = Y @ (V[:, there] / np.sqrt(squares[there]))
-    return new
+        squares, V = np.linalg.eigh(Y.T @ product(model.M, Y))
+        Y = Y @ (V[:, squares > least] / np.sqrt(squares[squares > least]))
+    return Y
