@@ -61,6 +61,10 @@ NEXT_MOMENT = (
     "the state is no equilibrium and no steady rotation: the eigenvalues describe its next moment only; linearise about the "
     "{} ({}; in Python {}, or {} and `fd.scene_at`)"
 )
+LASTING = {  # by whether nothing moves
+    True: ("equilibrium", "`--at-equilibrium`, `response --equilibrium`", 'about="equilibrium"', "`fd.static`"),
+    False: ("steady motion", "`--at-steady`, `response --steady`", 'about="steady"', "`fd.steady`"),
+}
 
 
 @dataclass(frozen=True, repr=False)
@@ -333,12 +337,7 @@ def _notes(near: Chart, steady: Steady | None, A: Array, rounding: Array | None)
         float(np.abs(applied).max()), float(np.abs(near.V / sizes(at)).max()) ** 2
     ):
         return []
-    of_it = (
-        ("equilibrium", "`--at-equilibrium`, `response --equilibrium`", 'about="equilibrium"', "`fd.static`")
-        if at_rest(near)
-        else ("steady motion", "`--at-steady`, `response --steady`", 'about="steady"', "`fd.steady`")
-    )
-    return [NEXT_MOMENT.format(*of_it)]
+    return [NEXT_MOMENT.format(*LASTING[at_rest(near)])]
 
 
 def _of_this_moment(found: Linearisation, scene: Scene, inputs: tuple[Effort | str, ...]) -> list[str]:
