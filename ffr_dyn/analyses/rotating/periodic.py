@@ -267,7 +267,8 @@ def _check_driven(of: Turns) -> None:
             raise ComputationError(
                 f"no motion of period {of.period:.6g} s was found: body {body.name!r} turns freely, and what brakes or "
                 "drives it changes its speed, which no driver sets; drive it evenly, as by a body on its axis that a driver "
-                "turns, and a bushing between both that is stiff about the axis alone; `steady` and `campbell` take it as it is"
+                "turns, and a bushing between both that is stiff about the axis alone; `steady` and `campbell` take it as "
+                "it is"
             )
 
 
