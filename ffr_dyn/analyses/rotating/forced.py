@@ -178,7 +178,8 @@ def _check_constant(scene: Scene, lasts: float) -> None:
         if (np.ptp(of, axis=0) > STEADY * np.abs(of).max(axis=0)).any():
             raise InputError(
                 f"{what} changes with time by itself, which does not come back at every frequency of the input; make it "
-                "constant for forced, or take `periodic` at one frequency, or `forward`"
+                "constant for forced, or take `periodic` at one frequency, or `forward`; of a machine that turns evenly, "
+                "under an input that is small, `response` about its steady motion"
             )
 
 
