@@ -17,13 +17,14 @@ import numpy as np
 
 from ffr_dyn.analyses.efforts import Effort, sized, with_units, with_work, without, work_of
 from ffr_dyn.analyses.integration import with_reactions_of
-from ffr_dyn.analyses.outcome import result_of
+from ffr_dyn.analyses.outcome import result_of, some_of
 from ffr_dyn.analyses.registry import OfMoment, option
 from ffr_dyn.analyses.rotating.steady import steady
 from ffr_dyn.analyses.settings import MomentSettings
 from ffr_dyn.analyses.states import scene_at
 from ffr_dyn.analyses.static import static
 from ffr_dyn.compile.engine import with_model
+from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.compile.structure import Structure
 from ffr_dyn.consistency.assemble import assemble, seen_in_space
 from ffr_dyn.consistency.doubts import KINK, checked
@@ -33,7 +34,7 @@ from ffr_dyn.consistency.kinks import check_sizes, held_by_nothing, kinked_force
 from ffr_dyn.consistency.tangent import STEP, Chart, at_rest, chart, derivative, rates, sizes, state, state_matrix
 from ffr_dyn.equations.forces import At
 from ffr_dyn.equations.layout import to_global_axes
-from ffr_dyn.kernels.tables import LAW
+from ffr_dyn.kernels.tables import LAW, Record
 from ffr_dyn.linear.eigen import NULL, eigen
 from ffr_dyn.linear.matrices import Modes, graded, modes_of, reduced
 from ffr_dyn.linear.matrices import state_matrix as steady_matrix
@@ -57,6 +58,14 @@ SHOWN = 12  # modes that a command prints
 BASE = {"base.x": 0, "base.y": 1, "base.z": 2}  # inputs: accelerations of the ground
 SAME = 1e-6  # of matrices at two angles of a steady motion, relative
 STATIONARY = 1e-6  # of the accelerations in moving axes, relative to those of the applied forces
+NEXT_MOMENT = (
+    "the state is no equilibrium and no steady rotation: the eigenvalues describe its next moment only; linearise about the "
+    "{} ({}; in Python {}, or {} and `fd.scene_at`)"
+)
+LASTING = {  # by whether nothing moves
+    True: ("equilibrium", "`--at-equilibrium`, `response --equilibrium`", 'about="equilibrium"', "`fd.static`"),
+    False: ("steady motion", "`--at-steady`, `response --steady`", 'about="steady"', "`fd.steady`"),
+}
 
 
 @dataclass(frozen=True, repr=False)
@@ -330,7 +339,7 @@ def _notes(near: Chart, steady: Steady | None, A: Array, rounding: Array | None)
         float(np.abs(applied).max()), float(np.abs(near.V / sizes(at)).max()) ** 2
     ):
         return []
-    return ["the state is no equilibrium and no steady rotation: the eigenvalues describe its next moment only"]
+    return [NEXT_MOMENT.format(*LASTING[at_rest(near)])]
 
 
 def _of_this_moment(found: Linearisation, scene: Scene, inputs: tuple[Effort | str, ...]) -> list[str]:
@@ -461,7 +470,7 @@ def _output_matrices(
         record = chart.at.record
         if chart.all_rows is not None:
             record = with_reactions_of(chart.all_rows.engine, chart.at.system, record)
-        result = result_of(chart.at.system, record, {}, outputs=("default", *quantities))
+        result = of_outputs(chart.at.system, record, quantities, outputs)
         values = np.array([float(result[name][0]) for name in outputs])
         return values - 2 * np.pi * turns * np.round((values - here) / (2 * np.pi))
 
@@ -481,6 +490,13 @@ def quantities_of(near: Chart, outputs: tuple[str, ...]) -> list[str]:
         if name.endswith(".work"):
             raise InputError(f"output {output!r} adds up over time and is no function of the state; take the power")
     return [name for name in found if name]
+
+
+def of_outputs(system: System, record: Record, quantities: Sequence[str], outputs: Sequence[str]) -> Result:
+    """What outputs are components of: these quantities alone, or of efforts, which are none of a scene's, a whole result."""
+    if len(quantities) == len(outputs):
+        return some_of(system, record, quantities)
+    return result_of(system, record, {}, outputs=("default", *quantities))
 
 
 def _components(near: Chart, outputs: tuple[str, ...]) -> tuple[str, ...]:

@@ -57,6 +57,12 @@ def result_of(
     return with_quantities(only(plain, system.scene, outputs), efforts(system.scene, plain), path)
 
 
+def some_of(system: System, record: Record, names: Sequence[str]) -> Result:
+    """Quantities of the catalogue of recorded states and nothing beside: for differences, which take them again and again."""
+    quantities, _ = measure(View(system, record), {}, selected(system, names))
+    return Result(record.time, quantities, {}, {})
+
+
 def turned_along(system: System, way: Record, rows: Sequence[int]) -> dict[str, Array]:
     """Joint angles (rows,) by name, which count their turns from state to state on a way, of which some are rows."""
     entries = selected(system, ("default",))

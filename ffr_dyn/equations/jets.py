@@ -48,7 +48,8 @@ class Jet:
 def dot(a: Jet, b: Jet) -> Jet:
     """a . b of two vectors."""
     mixed = a.first.T @ b.first
-    second = np.tensordot(a.value, b.second, 1) + np.tensordot(b.value, a.second, 1) + mixed + mixed.T
+    second = (a.value @ b.second.reshape(3, -1) + b.value @ a.second.reshape(3, -1)).reshape(mixed.shape)
+    second += mixed + mixed.T
     return Jet(a.value @ b.value, a.value @ b.first + b.value @ a.first, second)
 
 
@@ -179,7 +180,8 @@ def _length(line: Jet) -> list[Jet]:
 
 def _rotation_vector(at: Pair, place: BetweenAxes) -> list[Jet]:
     """psi = g z, z the axial vector of the relative rotation B, g = phi / sin(phi) a function of c = cos(phi)."""
-    B = [[dot(at.axis_i(a), at.axis_j(b)) for b in place.on_j.T] for a in place.on_i.T]
+    on_i, on_j = [at.axis_i(a) for a in place.on_i.T], [at.axis_j(b) for b in place.on_j.T]
+    B = [[dot(a, b) for b in on_j] for a in on_i]
     z = [(B[(k + 2) % 3][(k + 1) % 3] - B[(k + 1) % 3][(k + 2) % 3]) * 0.5 for k in range(3)]
     axial = axis_times_sine(np.array([[jet.value for jet in row] for row in B]))
     z = [replace(jet, value=value) for jet, value in zip(z, axial, strict=True)]

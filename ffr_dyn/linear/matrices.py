@@ -24,7 +24,9 @@ from ffr_dyn.linear.whirl import parted
 from ffr_prep.common.arrays import Array
 
 SKEW = 1e-3  # of a stiffness: what has no potential, beside which its motions are still those of an energy
-STEADILY = 1e-3  # of the speed: what it drifts by at most while it grows or decays, for that to be told
+# Of the speed: what it drifts by at most while it grows or decays, for that to be told. The drag of an unbalance, which
+# something beside the scene balances, is as slight beside its slope as a resonance is narrow.
+STEADILY = 1e-6
 ALIKE = 0.9  # of a mode: what is along the turning, of a change of the speed
 TOLD = 1e-4  # of frequencies that more harmonics would change, relative
 CUT = (
@@ -95,11 +97,14 @@ def modes_of(found: Steady) -> Modes:
 
     What turns on by itself keeps its speed where the speed is given, as nothing in the scene balances what would change it:
     the drag of an unbalance falls beyond a critical speed, and would make it grow; bent far there, a shaft would shake it.
+    What nothing drives or brakes keeps it, too, where matrices vary over a turn: about the mean of that, which leaves open
+    what goes around, such as a weight across the axis, it would be held or driven by what is left.
     """
     g, complete = turning_freely(found)
     loose, of = complete[:, :g], reduced(found)
     mean = eigen(of.K, of.C, loose=loose)
-    if not _speed_is_given(found, loose, mean):
+    left_alone = g > 0 and mean.free >= 2 * g and _varies(found, of)
+    if not (left_alone or _speed_is_given(found, loose, mean)):
         return _modes_with(found, of, mean)
     others = _without_spin(found, loose)
     held = replace(found, Z=found.Z @ others)
@@ -136,16 +141,21 @@ def _without_spin(found: Steady, loose: Array) -> Array:
 
 def _modes_with(found: Steady, of: Reduced, mean: Eigen) -> Modes:
     """Those of the mean, or Hill's where stiffness and damping vary."""
-    varying = _varying(found, of)
-    step = varying.step if varying.rate else 0
-    if not step:
+    if not _varies(found, of):
         return Modes(mean.values, _parted(found, mean)[None], mean.free, 0.0)
+    varying = _varying(found, of)
     all_of = hill(varying)
     order = np.lexsort((np.sign(all_of.values.imag), np.round(np.abs(all_of.values), 9)))
     values, parts, h = all_of.values[order], all_of.parts[..., order], len(all_of.parts) // 2
     values[: mean.free], parts[..., : mean.free] = 0.0, 0.0
     parts[h, :, : mean.free] = mean.vectors[:, : mean.free]
-    return Modes(values, parts, mean.free, step * varying.rate, all_of.left)
+    return Modes(values, parts, mean.free, varying.step * varying.rate, all_of.left)
+
+
+def _varies(found: Steady, of: Reduced) -> bool:
+    """Whether stiffness or damping varies over a turn at the one speed of what turns."""
+    varying = _varying(found, of)
+    return bool(varying.rate and varying.step)
 
 
 def _parted(found: Steady, of: Eigen) -> Array:

@@ -226,13 +226,13 @@ def _over_turn(machine: Machine, x: Array) -> list[_Loads]:
     """Forces (V,), stiffness and damping (V, V) at every phase: of one phase alone, what velocities add to forces at rest."""
     system, place = machine.system, machine.place
     now = At(system.scene, place, machine.time, x, velocities(place, machine.screws, x))
-    seeing = [force for force in forces_of(system.scene) if _sees_velocities(now, force)]
+    seeing = [(force, _looks(now, force)) for force in forces_of(system.scene) if _sees_velocities(now, force)]
     paced, _ = machine.screws.in_whole_turns()
     return [_loads(machine, time, carried(place, paced, x, time), seeing) for time in machine.phases]
 
 
-def _loads(machine: Machine, later: float, x: Array, seeing: Sequence[Force]) -> _Loads:
-    """At a phase; `seeing` are the forces that change with velocities."""
+def _loads(machine: Machine, later: float, x: Array, seeing: Sequence[tuple[Force, bool]]) -> _Loads:
+    """At a phase; `seeing` are the forces that change with velocities, and whether their laws look at the state."""
     system, place, time = machine.system, machine.place, machine.time + later
     forces, K = np.zeros(place.v_size), np.zeros((place.v_size, place.v_size))
     D = damping(system.scene, place, time, x)
@@ -244,8 +244,8 @@ def _loads(machine: Machine, later: float, x: Array, seeing: Sequence[Force]) ->
         return forces, K, D
     now = At(system.scene, place, time, x, velocities(place, machine.screws, x))
     total = nothing_on(all_placed(replace(now, v=np.zeros(place.v_size))), place.v_size)
-    for force in seeing:
-        if isinstance(force.place, (AtMarker, OnBody)) or _looks(now, force):
+    for force, looks in seeing:
+        if isinstance(force.place, (AtMarker, OnBody)) or looks:
             _add_by_differences(total, D, machine.screws, now, force)
         else:
             add_velocities(total, D, now, force, _ends(machine.screws, now, force))

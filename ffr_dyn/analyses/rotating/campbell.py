@@ -284,21 +284,28 @@ def _grown(speed: float, one: Spectrum, m: int) -> float:
 
 def _limits(at: AtSpeed, rows: Sequence[Row], m: int) -> list[dict[str, float]]:
     """From which speed and until which a vibration grows, away from rest, each between two rows: where it is damped on the
-    other side, where it is damped no more; where it is not, where its growth is no rounding."""
-    begins, ends = list[float](), list[float]()
-    for pair in pairwise(rows):
-        inner, outer = sorted(pair, key=lambda row: abs(row[0]))
-        for calm, grown, met in ((inner, outer, begins), (outer, inner, ends)):
-            if _grown(*calm, m) < 0 < _grown(*grown, m):
-                damped = _growth(*calm, m) < -rounding(calm[1])[m]
-                met.append(_between(at, calm, grown, m, _growth if damped else _grown))
-    return [_range(speed, ends) for speed in begins]
+    other side, where it is damped no more; where it is not, where its growth is no rounding. An end is sought beyond a
+    beginning alone."""
+    pairs = [(inner, outer) for inner, outer in (sorted(pair, key=_from_rest) for pair in pairwise(rows))]
+    begins = [_limit(at, inner, outer, m) for inner, outer in pairs if _grown(*inner, m) < 0 < _grown(*outer, m)]
+    ending = [pair for pair in pairs if _grown(*pair[1], m) < 0 < _grown(*pair[0], m)]
+    ending.sort(key=lambda pair: _from_rest(pair[1]))
+    found = list[dict[str, float]]()
+    for speed in begins:
+        beyond = (pair for pair in ending if pair[1][0] * speed > 0 and _from_rest(pair[1]) > abs(speed))
+        ends = [_limit(at, outer, inner, m) for inner, outer in list(beyond)[:1]]
+        found.append({"speed": speed} | ({"until": ends[0]} if ends else {}))
+    return found
 
 
-def _range(speed: float, ends: Sequence[float]) -> dict[str, float]:
-    """A speed from which a vibration grows, with the next one beyond it until which it does, if there is one."""
-    beyond = [end for end in ends if end * speed > 0 and abs(end) > abs(speed)]
-    return {"speed": speed, "until": min(beyond, key=abs)} if beyond else {"speed": speed}
+def _from_rest(row: Row) -> float:
+    return abs(row[0])
+
+
+def _limit(at: AtSpeed, calm: Row, grown: Row, m: int) -> float:
+    """Between a row at which a vibration does not grow and one at which it does."""
+    damped = _growth(*calm, m) < -rounding(calm[1])[m]
+    return _between(at, calm, grown, m, _growth if damped else _grown)
 
 
 def _crossings(at: AtSpeed, rows: Sequence[Row], m: int, measure: Measure) -> list[float]:

@@ -12,8 +12,7 @@ import numpy as np
 
 from ffr_dyn.analyses.efforts import Effort
 from ffr_dyn.analyses.integration import with_reactions_of
-from ffr_dyn.analyses.linearise import quantities_of
-from ffr_dyn.analyses.outcome import result_of
+from ffr_dyn.analyses.linearise import of_outputs, quantities_of
 from ffr_dyn.analyses.registry import OfMoment, option
 from ffr_dyn.analyses.rotating.inputs import Acting, absolute_order, acting, components, excited, told
 from ffr_dyn.analyses.rotating.response import about_state, band_in_words
@@ -181,7 +180,8 @@ def _check_constant(scene: Scene, lasts: float) -> None:
         if (np.ptp(of, axis=0) > STEADY * np.abs(of).max(axis=0)).any():
             raise InputError(
                 f"{what} changes with time by itself, which does not come back at every frequency of the input; make it "
-                "constant for forced, or take `periodic` at one frequency, or `forward`"
+                "constant for forced, or take `periodic` at one frequency, or `forward`; of a machine that turns evenly, "
+                "under an input that is small, `response` about its steady motion"
             )
 
 
@@ -209,7 +209,7 @@ def _motion(of: Wave, acts: Acting, at: Solution, names: Sequence[str]) -> Array
     if turning.near.all_rows is not None:
         record = with_reactions_of(turning.near.all_rows.engine, turning.system, record)
     wanted = quantities_of(turning.near, tuple(names))
-    result = result_of(turning.system, record, {}, outputs=("default", *wanted))
+    result = of_outputs(turning.system, record, wanted, names)
     values = np.stack([result[name] for name in names], axis=1)
     phase = 2j * np.pi * np.arange(1, of.of.steps + 1) / of.of.steps
     for k, name in enumerate(names):

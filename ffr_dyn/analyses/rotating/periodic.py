@@ -19,16 +19,17 @@ from ffr_dyn.analyses.settings import MomentSettings
 from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.consistency.assemble import Assembled, assemble
 from ffr_dyn.consistency.doubts import checked
-from ffr_dyn.consistency.evaluation import evaluator, joined, record_states
+from ffr_dyn.consistency.evaluation import evaluate, evaluator, joined, record_states
 from ffr_dyn.consistency.following import sudden
 from ffr_dyn.consistency.step_error import OVER_BREAKS, PARTLY_STIFF, Beside, step_errors, untold_breaks, worst
 from ffr_dyn.consistency.tangent import sizes_of
 from ffr_dyn.equations.constraint_rows import drive_of
-from ffr_dyn.equations.layout import moved
+from ffr_dyn.equations.layout import moved, to_global_axes
 from ffr_dyn.integrators import ROS3, Integrator
 from ffr_dyn.kernels.tables import Record
 from ffr_dyn.linear.returning import Returned, at_other_steps, returned
 from ffr_dyn.linear.turn_map import Turns, floquet_modes, floquet_shape, period_of, turns, turns_about
+from ffr_dyn.linear.turning_on import turning_on
 from ffr_dyn.linear.words import in_words
 from ffr_dyn.results.quantities import selected
 from ffr_dyn.results.result import Result
@@ -248,7 +249,27 @@ def _found(
     chosen = method if method is not None and not method.controlled else ROS3(length / STEPS)
     _check_drivers(assembled.system, time, length)
     of = turns(assembled.system, time, assembled.x, assembled.v, chosen, length)
-    return of, returned(of)
+    try:
+        return of, returned(of)
+    except ComputationError:
+        _check_driven(of)
+        raise
+
+
+def _check_driven(of: Turns) -> None:
+    """ComputationError for a body that begins to turn by more than half a turn in a period and that no driver holds."""
+    place, V = of.system.layout, of.near.V
+    jacobian = evaluate(of.near.at, of.near.time, of.near.x, to_global_axes(place, of.near.x, V)).jacobian
+    motions = turning_on(of.system, jacobian, V, of.sizes, together=False)
+    for b, body in enumerate(of.system.scene.bodies):
+        turning = place.omega(b)
+        if motions[turning].any() and np.linalg.norm(V[turning]) * of.period > np.pi:
+            raise ComputationError(
+                f"no motion of period {of.period:.6g} s was found: body {body.name!r} turns freely, and what brakes or "
+                "drives it changes its speed, which no driver sets; drive it evenly, as by a body on its axis that a driver "
+                "turns, and a bushing between both that is stiff about the axis alone; `steady` and `campbell` take it as "
+                "it is"
+            )
 
 
 def _check_drivers(system: System, time: float, period: float) -> None:

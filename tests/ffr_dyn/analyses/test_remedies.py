@@ -942,6 +942,7 @@ INPUT = [
     Case(lambda: fd.periodic(EVENLY, period=-1.0), lambda: fd.periodic(EVENLY)),
     Case(lambda: fd.periodic(EVENLY, period=0.3), lambda: fd.periodic(EVENLY)),
     Case(lambda: fd.periodic(spun(10.0), period=0.3), lambda: fd.periodic(spun(20 * np.pi), period=0.3)),
+    Case(lambda: fd.periodic(spun(12.0), period=0.3), lambda: fd.periodic(EVENLY)),
     Case(lambda: fd.Steady(speeds=("inf",)).perform(EVENLY, MOMENT), lambda: fd.steady(EVENLY)),
     Case(lambda: fd.steady(DRAGGED), lambda: fd.steady(TURNING)),
     Case(lambda: fd.steady(governor(1000.0)), lambda: fd.steady(governor(1.0))),

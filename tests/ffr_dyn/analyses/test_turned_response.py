@@ -196,3 +196,21 @@ def test_noise_that_turns_what_nothing_holds_ever_farther_is_told():
     assert np.isfinite(list(found["rms"].values())).tolist() == [False, True]
     (note,) = (note for note in found["notes"] if "ever farther" in note)
     assert note.startswith("noise at 29.921 Hz, in step with the turning")
+
+
+@pytest.mark.parametrize(
+    ("speed", "about"), [(300.0, "steady motion (`--at-steady`, `response --steady`"), (0.0, "equilibrium (`--at-equi")]
+)
+def test_a_state_that_does_not_last_is_told_with_what_does(speed, about):
+    """An unbalance that is not bent yet, and a weight that is not held yet. It was told without a way on."""
+    disc = fd.rigid_body("disc", mass=2.0, inertia=[0.1] * 3, centre_of_mass=(0, 1e-3, 0), points={"c": (0, 0, 0)})
+    bearing = fd.Bushing("bearing", "ground.c", "disc.c", stiffness=(1e6, 1e6, 1e6, 0, 1e3, 1e3))
+    scene = fd.Scene(
+        (fd.Body("disc", disc, omega_bar=(speed, 0, 0)),),
+        forces=(bearing,),
+        ground={"c": (0, 0, 0)},
+        gravity=(-9.81, 0, 0),
+    )
+    notes = [note for note in fd.linearise(scene).notes if "next moment only" in note]
+    assert len(notes) == 1
+    assert about in notes[0]

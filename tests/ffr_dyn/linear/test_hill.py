@@ -168,3 +168,31 @@ def test_the_damping_of_a_whirl_is_that_at_the_frequency_seen_from_the_ground():
     whirling = np.array(found.attributes["whirling"], bool)
     np.testing.assert_allclose(np.sort(found["damping_ratios"][0, whirling]), np.sort(ratios), rtol=1e-6)
     assert sum("mean over a turn" in note for note in found.attributes["notes"]) == 1
+
+
+@pytest.mark.parametrize("speed", [100.2, 110.2, 119.9])
+def test_a_free_rotor_under_weight_is_as_one_that_is_driven_evenly_beside_a_vibration_that_stands_still(speed):
+    """Frequencies sqrt(k / m) either way of a disc drawn where its weight has not bent its bearings yet. About the mean of a
+    turn the weight turned it by the way that the unbalance bends it: beside 100 and 120 rad/s, and between them, where that
+    mean has its own critical speed, the disc was told to grow by 0.16 1/s, and its frequencies were up to 2e-3 off."""
+    disc = fd.rigid_body(
+        "disc",
+        mass=1.0,
+        inertia=[1e-3, 8e-4, 8e-4],
+        centre_of_mass=(0, 1e-5, 0),
+        points={"l": (-0.1, 0, 0), "r": (0.1, 0, 0)},
+    )
+    bearings = tuple(
+        fd.Bushing(end, f"ground.{end}", f"disc.{end}", stiffness=(1e5, 0.5e4, 0.72e4, 0, 0, 0)) for end in "lr"
+    )
+    scene = fd.Scene(
+        (fd.Body("disc", disc, omega_bar=(speed, 0, 0)),),
+        forces=bearings,
+        ground={"l": (-0.1, 0, 0), "r": (0.1, 0, 0)},
+        gravity=(0, -9.81, 0),
+    )
+    found = fd.linearise(fd.scene_at(scene, fd.steady(scene)))
+    assert np.abs(found.eigenvalues.real).max() < 1e-9
+    seen = np.abs(found.seen) * 2 * np.pi
+    for exact in (100.0, 120.0):
+        assert np.abs(seen - exact).min() < 1e-6 * exact

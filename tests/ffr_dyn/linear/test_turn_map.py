@@ -372,3 +372,32 @@ def test_a_vibration_that_excites_itself_is_sent_to_a_forward_run():
     )
     with pytest.raises(fd.ComputationError, match="excites itself makes its own period: run `forward` until"):
         fd.periodic(scene, period=6.6, method=fd.ROS3(0.066))
+
+
+def braked(driven: bool) -> fd.Scene:
+    """A disc with an unbalance in bearings that brake its whirl, by itself or on a motor that turns evenly."""
+    disc = fd.rigid_body(
+        "disc", mass=1.0, inertia=[1e-3] * 3, centre_of_mass=(0, 1e-3, 0), points={"l": (-0.1, 0, 0), "r": (0.1, 0, 0)}
+    )  # fmt: skip
+    shaft = fd.rigid_body("shaft", mass=1.0, inertia=[1e-3] * 3, points={"c": (0, 0, 0)})
+    K, C = (1e5, 5e3, 5e3, 0, 0, 0), (20, 20, 20, 0, 0, 0)
+    bearings = [fd.Bushing(f"at_{end}", f"ground.{end}", f"disc.{end}", K, C) for end in "lr"]
+    coupling = fd.Bushing("coupling", "shaft.c", "disc.l", stiffness=(0, 0, 0, 50, 0, 0), damping=(0, 0, 0, 0.1, 0, 0))
+    return fd.Scene(
+        [fd.Body(name, body, omega_bar=(90.0, 0, 0)) for name, body in {"disc": disc, "shaft": shaft}.items()][: 1 + driven],
+        [fd.Joint("motor", "revolute", "ground.l", "shaft.c", axis=(1, 0, 0))] if driven else [],
+        drivers=[fd.Driver("turn", "motor", fd.polynomial(0, 90.0))] if driven else [],
+        forces=[*bearings, coupling] if driven else bearings,
+        ground={"l": (-0.1, 0, 0), "r": (0.1, 0, 0)},
+    )  # fmt: skip
+
+
+def test_a_rotor_whose_speed_nothing_keeps_is_told_to_be_driven():
+    """It was told to begin nearer. Driven, it whirls as a Jeffcott rotor: m e W^2 / |k - m W^2 + i c W|."""
+    with pytest.raises(
+        fd.ComputationError, match="body 'disc' turns freely, and what brakes or drives it changes its speed"
+    ):
+        fd.periodic(braked(False), period=2 * np.pi / 90)
+    turn = fd.periodic(braked(True), method=fd.ROS3(2 * np.pi / 90 / 400), check=False)
+    whirl = np.linalg.norm(turn["disc.l.position"][:, 1:], axis=1)
+    np.testing.assert_allclose(whirl, 1e-3 * 90**2 / abs(1e4 - 90**2 + 40j * 90), rtol=1e-4)
