@@ -277,9 +277,6 @@ def write_csv(result: Result, path: str | Path, names: Iterable[str] | None = No
     Raises InputError for unknown names and a path that is a folder or a link, ComputationError where the file cannot be
     written.
 
-    Raises InputError for unknown names and a path that is a folder or a link, ComputationError where the file cannot be
-    written.
-
     >>> fd.write_csv(result, "tip.csv", ["rod.tip.position"])
     """
     headings, rows = table(result, names)
