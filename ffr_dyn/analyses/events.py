@@ -2,9 +2,11 @@
 
 Every step of the integrator is looked at (ten states from row to row where it chooses its steps). Where the quantity has
 passed the value within one, the step is done again, from the same state and shorter, until its end is the event: a root of
-one unknown, the length of the step, which Brent's method (1973) finds to the rounding of the time. ROS2 does it again where a
-method goes on from what it remembers, or iterates on positions, which is lost in rounding in so short a step. So an event is
-as accurate as the method, and lies on the constraints as it does.
+one unknown, the length of the step, which Brent's method (1973) finds to the rounding of the time. Where it came so near that
+it may have passed the value and come back, the step is done again until the quantity is farthest, and where it is beyond the
+value there, both moments are found. ROS2 does it again where a method goes on from what it remembers, or iterates on
+positions, which is lost in rounding in so short a step. So an event is as accurate as the method, and lies on the constraints
+as it does.
 
 How accurate that is, the same events of runs with other steps tell, as they tell the error of every output. Where a quantity
 vibrates at a frequency that steps do not resolve, it is its amplitude over the rate at which the quantity passes the value:
@@ -20,7 +22,7 @@ from numbers import Real
 from typing import Any, Literal
 
 import numpy as np
-from scipy.optimize import brentq
+from scipy.optimize import brentq, minimize_scalar
 
 from ffr_dyn.compile.engine import Engine, fill_rows, new_engine, record_row
 from ffr_dyn.compile.scene_tables import System
@@ -38,6 +40,8 @@ from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
 
 WIDTH = 4 * np.finfo(float).eps  # of a step, and relative: what brentq can reach
+NARROW = 1e-4  # of a step, to which the moment is found at which a quantity is farthest
+REACH = 2.0  # of the last step: how near to a value a quantity that may pass it and come back has come
 AT_ONCE = 1e-6  # of a step: moments that are nearer to each other are one
 ROUNDING = 1e-14  # of the times of a run: no moment is known better
 SHOWN = 3  # times in a note
@@ -55,8 +59,8 @@ class Event:
     direction : "rising", "falling" or "either"
     stop      : the run ends there
 
-    An event is seen when the quantity is on the two sides of the value at the two ends of a step of the integrator: twice
-    within a step is not.
+    An event is seen when the quantity is on the two sides of the value at the two ends of a step of the integrator, and when
+    it passes the value and comes back once within a step.
 
     Raises InputError for another direction, and a value that is not finite.
 
@@ -83,16 +87,19 @@ _Seen = Callable[[Record, Any], tuple[Array, Any]]
 
 @dataclass(frozen=True)
 class _Crossing:
-    """An event between rows `row` - 1 and `row`, between which the quantity has a mean rate; `memory` is of the rows up to
-    the first of them."""
+    """An event between rows `row` - 1 and `row`, at a length of the step that lies `within` two [s], between which the
+    quantity has a mean rate; `memory` is of the rows up to the first of them."""
 
     number: int
     row: int
     rising: bool
     rate: float
     memory: Any
+    within: tuple[float, float]
 
 
+# whether it rises, its mean rate, and the lengths of a step between which a quantity passes a value
+_Part = tuple[bool, float, tuple[float, float]]
 # an event as plain data, its declaration, the row that follows it, and a row of its own
 _Located = tuple[dict[str, Any], Event, int, Record]
 
@@ -120,21 +127,21 @@ class Watcher:
         self._seen = [_seen(system, event) for event in self.events]
         self._system, self._method, self._gains, self._spacing = system, method, gains, spacing
         self._memory: list[Any] = [None] * len(self.events)
-        self._last: Record | None = None
+        self._tail: Record | None = None  # the last two rows, or the first; the memory is of the first of them
 
     def begin(self, engine: Engine, time: float) -> None:
         """Take the state of a run's engine as what comes before the first row."""
         first = new_record(self._system, 1)
         record_row(engine, time, first, 0)  # with which the run has begun
-        first = self._complete(first)
-        self._memory = [seen(first, None)[1] for seen in self._seen]
-        self._last = first
+        self._tail = self._complete(first)
+        self._memory = [seen(self._tail, None)[1] for seen in self._seen]
 
     def look(self, rows: Record) -> tuple[Record, bool]:
         """The rows that belong to the run, and whether it ends: the last row is that of the event then."""
-        assert self._last is not None
-        joined = Record(*(np.concatenate(pair) for pair in zip(self._last, rows, strict=True)))
-        located = self._in_order(self._located(joined, crossing) for crossing in self._crossings(joined))
+        assert self._tail is not None
+        known = self._tail.time.size
+        joined = Record(*(np.concatenate(pair) for pair in zip(self._tail, rows, strict=True)))
+        located = self._in_order(self._located(joined, crossing) for crossing in self._crossings(joined, known - 1))
         for found, event, row, at_event in located:
             self.found.append(found)
             if event.stop:
@@ -142,10 +149,11 @@ class Watcher:
                 apart = AT_ONCE * self._spacing
                 at_once = (other for other, *_ in located if abs(other["time"] - found["time"]) <= apart)
                 self.found += [other for other in at_once if other not in self.found]
-                before = [column[1:row] for column in joined]
+                before = [column[known:row] for column in joined]
                 return Record(*(np.concatenate(pair) for pair in zip(before, at_event, strict=True))), True
-        self._memory = [seen(joined, memory)[1] for seen, memory in zip(self._seen, self._memory, strict=True)]
-        self._last = Record(*(column[-1:].copy() for column in rows))
+        passed = Record(*(column[:-1] for column in joined))
+        self._memory = [seen(passed, memory)[1] for seen, memory in zip(self._seen, self._memory, strict=True)]
+        self._tail = Record(*(column[-2:].copy() for column in joined))
         return rows, False
 
     def _in_order(self, located: Iterable[_Located]) -> list[_Located]:
@@ -157,30 +165,58 @@ class Watcher:
             moments.append((moment, self.events.index(one[1]), k))
         return [found[k] for *_, k in sorted(moments)]
 
-    def _crossings(self, rows: Record) -> Iterator[_Crossing]:
+    def _crossings(self, rows: Record, first: int) -> Iterator[_Crossing]:
+        """Of the steps that begin with row `first` or a later one."""
         for number, event in enumerate(self.events):
             values = self._seen[number](rows, self._memory[number])[0] - event.value
-            rises, falls = (values[:-1] < 0) & (values[1:] >= 0), (values[:-1] > 0) & (values[1:] <= 0)
-            wanted = {"rising": rises, "falling": falls, "either": rises | falls}[event.direction]
-            for k in np.flatnonzero(wanted).tolist():
-                before = Record(*(column[: k + 1] for column in rows))
-                rate = float(values[k + 1] - values[k]) / float(rows.time[k + 1] - rows.time[k])
-                yield _Crossing(
-                    number, k + 1, bool(rises[k]), rate, self._seen[number](before, self._memory[number])[1]
-                )
+            wanted = {"rising": (True,), "falling": (False,), "either": (True, False)}[event.direction]
+            once, back = passed(values), turned(values)
+            for k in range(first, values.size - 1):
+                if once[k] or back[k]:
+                    memory = self._seen[number](Record(*(column[: k + 1] for column in rows)), self._memory[number])[1]
+                    ends = (values[k], values[k + 1])
+                    parts = self._once(ends) if once[k] else self._there_and_back(rows, number, k, ends, memory)
+                    for rising, rate, within in parts:
+                        if rising in wanted:
+                            yield _Crossing(number, k + 1, rising, rate, memory, within)
+
+    def _once(self, ends: tuple[float, float]) -> Iterator[_Part]:
+        """The whole step, at the ends of which the quantity is on the two sides."""
+        rise = float(ends[1] - ends[0])
+        yield rise > 0, rise / self._spacing, (WIDTH * self._spacing, self._spacing)
+
+    def _there_and_back(
+        self, rows: Record, number: int, k: int, ends: tuple[float, float], memory: Any
+    ) -> Iterator[_Part]:
+        """The parts of a step before and after the moment at which the quantity is farthest beyond the value, if it is."""
+        side, whole = float(np.sign(ends[0])), self._spacing
+
+        def height(length: float) -> float:
+            return side * self._over(rows, number, k, length, memory)
+
+        found = minimize_scalar(height, bounds=(0.0, whole), method="bounded", options={"xatol": NARROW * whole})
+        farthest, depth = float(found.x), float(found.fun)
+        if depth < 0:
+            sinking, climbing = side * depth - ends[0], ends[1] - side * depth
+            yield side < 0, sinking / farthest, (WIDTH * whole, farthest)
+            yield side > 0, climbing / (whole - farthest), (farthest, whole)
+
+    def _over(self, rows: Record, number: int, k: int, length: float, memory: Any) -> float:
+        """By how much the quantity is over the value at the end of a step of this length from row k."""
+        return float(self._seen[number](self._redone(rows, k, length), memory)[0][0]) - self.events[number].value
 
     def _located(self, rows: Record, crossing: _Crossing) -> _Located:
-        event, seen, k = self.events[crossing.number], self._seen[crossing.number], crossing.row - 1
+        event, k = self.events[crossing.number], crossing.row - 1
         sign = 1.0 if crossing.rising else -1.0
 
         def beyond(length: float) -> float:
-            return sign * (float(seen(self._redone(rows, k, length), crossing.memory)[0][0]) - event.value)
+            return sign * self._over(rows, crossing.number, k, length, crossing.memory)
 
-        whole, least, length = self._spacing, WIDTH * self._spacing, 0.0
+        (least, most), width = crossing.within, WIDTH * self._spacing
         if beyond(least) >= 0:  # at the beginning, where the state is brought back onto the constraints
             length = least
         else:
-            length = whole if beyond(whole) <= 0 else float(brentq(beyond, least, whole, xtol=least, rtol=WIDTH))
+            length = most if beyond(most) <= 0 else float(brentq(beyond, least, most, xtol=width, rtol=WIDTH))
         own = self._redone(rows, k, length)
         found = {
             "event": event.name,
@@ -205,6 +241,22 @@ class Watcher:
         if status != OK:
             raise failure(self._system, engine.work, status, time, Settings(method, self._gains[2] > 0))
         return self._complete(end)
+
+
+def passed(values: Array) -> Array:
+    """(T - 1,) whether values (T,) pass zero from each row to the next."""
+    before, after = values[:-1], values[1:]
+    found: Array = ((before < 0) & (after >= 0)) | ((before > 0) & (after <= 0))
+    return found
+
+
+def turned(values: Array) -> Array:
+    """(T - 1,) whether values (T,) may pass zero and come back from each row to the next, as they came near it by the step
+    before: one that is convex does so only where it would pass as fast as it came. Of the first step nothing is known."""
+    found = values[:-1] * values[1:] > 0
+    came = np.sign(values[1:-1]) * (values[:-2] - values[1:-1])
+    found[1:] &= np.abs(values[1:-1]) < REACH * came
+    return found
 
 
 # ---- what an event looks at -----------------------------------------------------------------------------------------

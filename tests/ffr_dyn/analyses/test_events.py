@@ -24,6 +24,7 @@ from ffr_dyn.integrators.tolerances import tolerances
 from ffr_dyn.results.file import load_result
 from ffr_dyn.scene.joints import Joint
 from ffr_dyn.scene.scene import Body, Scene
+from ffr_dyn.scene.sensors import Measurement
 from ffr_dyn.scene_file.read import load_scene
 from ffr_dyn.scene_file.write import to_toml
 from ffr_prep.body import rigid_body
@@ -71,6 +72,41 @@ def test_free_fall_to_the_last_digits(method):
     plain = integrate(THROWN, end=0.6, output_step=0.3, method=method)
     np.testing.assert_array_equal(result["ball.R"], plain["ball.R"])
     assert "events" not in plain.attributes
+
+
+@pytest.mark.parametrize("top", [0.325, 0.02])
+@pytest.mark.parametrize("below", [1e-3, 1e-9])
+def test_a_value_that_is_passed_twice_within_a_step_is_an_event_twice(below, top):
+    """y = 10 top t - 5 t^2 is highest at `top`, within a step of 0.05, the first one, too, and less than a step over the
+    value: both moments were missed, and so was the end of a run at one."""
+    ball = Body("ball", BALL, velocity=(1, 10 * top, 0))
+    value, half = 5 * top**2 - below, np.sqrt(below / 5)
+    y = "ball.c.position.y"
+    events = (
+        Event("up", y, value, direction="rising"),
+        Event("down", y, value, direction="falling"),
+        Event("both", y, value),
+        Event("never", y, 5 * top**2 + 1e-9),
+        Event("function", lambda t, state: state.position("ball.c")[1], value),
+    )
+    run = partial(integrate, Scene((ball,), gravity=(0, -10, 0)), end=0.75, output_step=0.25, method=RK4(0.05))
+    result, root = run(events=events), (top - half, top + half)
+    for name, expected in (("up", root[:1]), ("down", root[1:]), ("both", root), ("never", ()), ("function", root)):
+        np.testing.assert_allclose(times(result, name), expected, rtol=0, atol=1e-11, err_msg=name)
+    assert [event["rising"] for event in result.attributes["events"] if event["event"] == "both"] == [True, False]
+    ended = run(events=[Event("down", y, value, direction="falling", stop=True)])
+    assert ended.time[-1] == pytest.approx(root[1], abs=1e-11)
+
+
+def test_a_distance_that_is_least_within_a_step_passes_a_value_twice():
+    """A ball flies past a point 1 mm off: its distance has nearly a kink, and is below 5 mm for 2 sqrt(24) mm of the way."""
+    ball = Body("ball", BALL, position=(-0.325, 0.001, 0), velocity=(1, 0, 0))
+    scene = Scene(
+        (ball,), ground={"O": (0, 0, 0)}, measurements=(Measurement("gap", "ground.O", "ball.c", "distance"),)
+    )
+    near = Event("near", "measured.gap", 0.005)
+    result = integrate(scene, end=0.75, output_step=0.25, method=RK4(0.05), events=[near])
+    np.testing.assert_allclose(times(result), 0.325 + 1e-3 * np.sqrt(24) * np.array([-1, 1]), rtol=0, atol=1e-12)
 
 
 def test_a_run_ends_at_an_event(tmp_path):
