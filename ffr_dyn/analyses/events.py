@@ -146,9 +146,7 @@ class Watcher:
             self.found.append(found)
             if event.stop:
                 self.ended_by = event.name
-                apart = AT_ONCE * self._spacing
-                at_once = (other for other, *_ in located if abs(other["time"] - found["time"]) <= apart)
-                self.found += [other for other in at_once if other not in self.found]
+                self.found += [of for of, *_ in located if self._at_once(of, found) and of not in self.found]
                 before = [column[known:row] for column in joined]
                 return Record(*(np.concatenate(pair) for pair in zip(before, at_event, strict=True))), True
         passed = Record(*(column[:-1] for column in joined))
@@ -156,12 +154,15 @@ class Watcher:
         self._tail = Record(*(column[-2:].copy() for column in joined))
         return rows, False
 
+    def _at_once(self, one: Mapping[str, Any], other: Mapping[str, Any]) -> bool:
+        return bool(abs(one["time"] - other["time"]) <= AT_ONCE * self._spacing)
+
     def _in_order(self, located: Iterable[_Located]) -> list[_Located]:
         """By their times; those of one moment as they are declared, which rounding would order by chance."""
         found = sorted(located, key=lambda one: one[0]["time"])
         moment, moments = -1, []
         for k, one in enumerate(found):
-            moment += not k or one[0]["time"] - found[k - 1][0]["time"] > AT_ONCE * self._spacing
+            moment += not k or not self._at_once(one[0], found[k - 1][0])
             moments.append((moment, self.events.index(one[1]), k))
         return [found[k] for *_, k in sorted(moments)]
 
