@@ -15,6 +15,7 @@ a single moment catches vibration in some phase.
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, replace
 from difflib import get_close_matches
@@ -24,6 +25,7 @@ from typing import Any, Literal
 import numpy as np
 from scipy.optimize import brentq, minimize_scalar
 
+from ffr_dyn.analyses.checkpoint import Checkpoint
 from ffr_dyn.compile.engine import Engine, fill_rows, new_engine, record_row
 from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.compile.workspace import new_record
@@ -33,7 +35,7 @@ from ffr_dyn.consistency.step_error import Beside, StepError, step_errors
 from ffr_dyn.equations.state_view import StateView
 from ffr_dyn.integrators import ROS2, Integrator
 from ffr_dyn.kernels.tables import OK, Record
-from ffr_dyn.results.quantities import Entry, catalogue
+from ffr_dyn.results.quantities import Entry, Memory, catalogue
 from ffr_dyn.results.recorded_motion import View
 from ffr_dyn.results.result import Quantity, Result
 from ffr_prep.common.arrays import Array
@@ -46,6 +48,7 @@ AT_ONCE = 1e-6  # of a step: moments that are nearer to each other are one
 ROUNDING = 1e-14  # of the times of a run: no moment is known better
 SHOWN = 3  # times in a note
 LEAST_BESIDE, BESIDE = 8, 0.05  # rows beside an event, and their part of all rows
+TAIL, FOUND, MEMORY = "events.tail.", "events.found", "events.memory."  # names in a checkpoint
 _FINER = "take a smaller step, or a value that is passed faster"
 
 
@@ -135,6 +138,20 @@ class Watcher:
         record_row(engine, time, first, 0)  # with which the run has begun
         self._tail = self._complete(first)
         self._memory = [seen(self._tail, None)[1] for seen in self._seen]
+
+    def state(self) -> tuple[dict[str, Array], Memory]:
+        """What a run goes on with from its last row, for a `Checkpoint`: arrays, and what quantities remember."""
+        assert self._tail is not None
+        found = json.dumps([self.found, self.ended_by]).encode()
+        tail = {TAIL + name: column for name, column in self._tail._asdict().items()}
+        memory = {f"{MEMORY}{k}": of for k, of in enumerate(self._memory) if of is not None}
+        return tail | {FOUND: np.frombuffer(found, dtype=np.uint8)}, memory
+
+    def go_on(self, saved: Checkpoint) -> None:
+        """Take the state of a run that was stopped."""
+        self.found, self.ended_by = json.loads(saved.arrays[FOUND].tobytes())
+        self._tail = Record(*(saved.arrays[TAIL + name] for name in Record._fields))
+        self._memory = [saved.memory.get(f"{MEMORY}{k}") for k in range(len(self.events))]
 
     def look(self, rows: Record) -> tuple[Record, bool]:
         """The rows that belong to the run, and whether it ends: the last row is that of the event then."""

@@ -15,7 +15,7 @@ import numpy as np
 
 from ffr_dyn.analyses.checkpoint import Checkpoint, decode, encode, fingerprint, leaves
 from ffr_dyn.analyses.energy import EnergyWatch
-from ffr_dyn.analyses.events import Event, Watcher
+from ffr_dyn.analyses.events import MEMORY, Event, Watcher
 from ffr_dyn.closing.limits import with_limits
 from ffr_dyn.closing.passed_positions import passed_in_words
 from ffr_dyn.compile.divided_steps import Fast, divided, fast_of
@@ -75,13 +75,14 @@ _MOST_ROWS = 1e9  # each of hundreds of bytes at least
 @dataclass
 class _Run:
     """The part of a run that changes while it goes on; `done` counts the steps. The first row is `unseen` until others can
-    be looked at with it."""
+    be looked at with it; `watcher` looks for events, if there are any."""
 
     engine: Engine
     energy: EnergyWatch
     kept: Kept
     seen: Seen
     done: int
+    watcher: Watcher | None
     unseen: Record | None = None
 
 
@@ -128,15 +129,15 @@ def integrate(
     assembled = assemble(scene, time=start) if assembled is None else assembled
     wanted = selected(assembled.system, outputs)
     path = resume if path is None else path
-    mark = "" if path is None else _fingerprint(assembled, method, stabilisation, start, output_step, wanted)
+    mark = "" if path is None else _fingerprint(assembled, method, stabilisation, start, output_step, wanted, events)
     assembled = _with_divided_steps(assembled, fast, spacing)
     header = _header(scene, assembled, method, stabilisation, (start, end, output_step))
     kept = _kept(assembled.system, wanted, rows) if path is None and not events else Measured(assembled.system, wanted)
-    run = _begun(assembled, method, stabilisation, start, spacing, kept, resume, mark, fast)
+    watcher = _watcher(assembled, method, stabilisation, spacing, events)
+    run = _begun(assembled, method, stabilisation, start, spacing, kept, resume, mark, fast, watcher)
     _check_resumed(run.done, substeps * rows, output_step / substeps)
-    watcher = _watcher(assembled, run, method, stabilisation, spacing, events, resume) if events else None
     with nullcontext() if path is None else _writer(path, scene, run, header, mark) as writer:
-        for times, part in _advance(assembled, run, method, start, substeps, rows, wanted, stopwatch, watcher):
+        for times, part in _advance(assembled, run, method, start, substeps, rows, wanted, stopwatch):
             if writer is not None:
                 writer.append(times, {name: quantity.values for name, quantity in part.items()}, _checkpoint(run, mark))
             if progress is not None:
@@ -259,6 +260,7 @@ def _begun(
     resume: str | Path | None,
     mark: str,
     fast: Fast | None,
+    watcher: Watcher | None,
 ) -> _Run:
     """The run at its start, or where the file to resume left it."""
     system, gained = assembled.system, gains(stabilisation)
@@ -267,11 +269,19 @@ def _begun(
     moments = np.zeros(0) if fast is None else fast.moments
     energy = EnergyWatch(system, method, gained, spacing, lambda rows: with_all_reactions(assembled, rows), moments)
     if resume is not None and Path(resume).exists():
-        return _resumed(Path(resume), mark, engine, energy, seen, kept)
-    return _started(assembled, engine, energy, seen, start, kept)
+        return _resumed(Path(resume), mark, engine, energy, seen, kept, watcher)
+    return _started(assembled, engine, energy, seen, start, kept, watcher)
 
 
-def _started(assembled: Assembled, engine: Engine, energy: EnergyWatch, seen: Seen, start: float, kept: Kept) -> _Run:
+def _started(
+    assembled: Assembled,
+    engine: Engine,
+    energy: EnergyWatch,
+    seen: Seen,
+    start: float,
+    kept: Kept,
+    watcher: Watcher | None,
+) -> _Run:
     """The run with its first row."""
     first = new_record(assembled.system, 1)
     status = record_row(engine, start, first, 0)
@@ -281,11 +291,13 @@ def _started(assembled: Assembled, engine: Engine, energy: EnergyWatch, seen: Se
     singular = engine.work.independence[HERE] < AT
     shown = with_limits(assembled.system, assembled.all_rows, first) if singular else first
     kept.add(View(assembled.system, shown), np.zeros(1, dtype=np.int64))
-    run = _Run(engine, energy, kept, seen, 0)
+    run = _Run(engine, energy, kept, seen, 0, watcher)
     if isinstance(kept, Measured):
         _look(run, first)  # a file holds what has been seen of its rows
     else:
         run.unseen = first
+    if watcher is not None:
+        watcher.begin(engine, start)
     return run
 
 
@@ -306,7 +318,6 @@ def _advance(
     rows: int,
     wanted: Mapping[str, Entry],
     stopwatch: Stopwatch | None,
-    watcher: Watcher | None = None,
 ) -> Iterator[tuple[Array, dict[str, Quantity]]]:
     """Yields (times, quantities) of output rows chunk after chunk, each about SECONDS_PER_CALL long.
 
@@ -314,10 +325,10 @@ def _advance(
     kept.
     """
     system, steps, watch = assembled.system, run.engine.tables.clock.steps, stopwatch or Stopwatch()
-    looks = substeps if needs_every_step(wanted) or watcher is not None else 1
-    ends = False
+    looks, watcher = substeps if needs_every_step(wanted) or run.watcher is not None else 1, run.watcher
+    ends = watcher is not None and watcher.ended_by is not None
     count = _first_rows(system, method, substeps)
-    while run.done < rows * substeps:
+    while run.done < rows * substeps and not ends:
         chunk = new_record(system, looks * min(count, rows - run.done // substeps))
         with watch:
             status = fill_rows(run.engine, chunk, start, substeps // looks)
@@ -342,9 +353,7 @@ def _advance(
                 raise ComputationError(lost.text)
             run.done += filled // looks * substeps
             yield times, part
-        if ends:
-            return
-        if status != OK:
+        if status != OK and not ends:
             _require_soft(run, method, status, reached(run.engine, start))
             gained = run.energy.gains
             branches = BRANCHES if run.done == 0 and BRANCHES in assembled.notes else ""
@@ -404,21 +413,11 @@ def _shown(rows: int, looks: int, ends: bool) -> Array:
 
 
 def _watcher(
-    assembled: Assembled,
-    run: _Run,
-    method: Integrator,
-    stabilisation: Stabilisation,
-    spacing: float,
-    events: Sequence[Event],
-    resume: str | Path | None,
-) -> Watcher:
-    """The search for events from where the run stands."""
-    if resume is not None:
-        _check_no_events(events)
+    assembled: Assembled, method: Integrator, stabilisation: Stabilisation, spacing: float, events: Sequence[Event]
+) -> Watcher | None:
+    """The search for events; None where there are none."""
     complete = partial(with_all_reactions, assembled)
-    watcher = Watcher(assembled, method, gains(stabilisation), spacing, events, complete)
-    watcher.begin(run.engine, float(run.kept.times[0][0]))
-    return watcher
+    return Watcher(assembled, method, gains(stabilisation), spacing, events, complete) if events else None
 
 
 def _passed(watcher: Watcher) -> dict[str, Any]:
@@ -467,9 +466,12 @@ def _fingerprint(
     start: float,
     output_step: float,
     wanted: Mapping[str, Entry],
+    events: Sequence[Event],
 ) -> str:
     state = (assembled.x.tobytes(), assembled.v.tobytes())
-    return fingerprint(assembled.system.model, *state, method, stabilisation, start, output_step, list(wanted))
+    looked_for = [replace(of, quantity="") if callable(of.quantity) else of for of in events]
+    settings = (method, stabilisation, start, output_step, list(wanted), *looked_for)
+    return fingerprint(assembled.system.model, *state, *settings)
 
 
 KEY = "machine."  # before the names of an engine's tables in result files
@@ -477,7 +479,9 @@ KEY = "machine."  # before the names of an engine's tables in result files
 
 def _checkpoint(run: _Run, mark: str) -> Array:
     assert isinstance(run.kept, Measured)
-    return encode(Checkpoint(mark, run.done, _arrays(run.engine, run.energy, run.seen), run.kept.memory))
+    arrays, memory = ({}, {}) if run.watcher is None else run.watcher.state()
+    whole = _arrays(run.engine, run.energy, run.seen) | arrays
+    return encode(Checkpoint(mark, run.done, whole, {**run.kept.memory, **memory}))
 
 
 def _arrays(engine: Engine, energy: EnergyWatch, seen: Seen) -> dict[str, Array]:
@@ -508,17 +512,9 @@ def check_continues(
 ) -> None:
     """Raises InputError where the run that a result file holds does not go on with these settings; what `others` there are
     does not matter."""
-    _check_no_events(events)
     wanted = selected(assembled.system, outputs)
-    saved = _saved(Path(path), _fingerprint(assembled, method, stabilisation, start, output_step, wanted))
+    saved = _saved(Path(path), _fingerprint(assembled, method, stabilisation, start, output_step, wanted, events))
     _check_resumed(saved.steps, round((end - start) / method.step), method.step)
-
-
-def _check_no_events(events: Sequence[Event]) -> None:
-    if events:
-        raise InputError(
-            "a run with events cannot be resumed: those of its first part are not in the file; run the whole"
-        )
 
 
 def _saved(path: Path, mark: str) -> Checkpoint:
@@ -535,7 +531,9 @@ def _saved(path: Path, mark: str) -> Checkpoint:
     return saved
 
 
-def _resumed(path: Path, mark: str, engine: Engine, energy: EnergyWatch, seen: Seen, kept: Kept) -> _Run:
+def _resumed(
+    path: Path, mark: str, engine: Engine, energy: EnergyWatch, seen: Seen, kept: Kept, watcher: Watcher | None
+) -> _Run:
     """The run that a result file holds, ready to go on in the engine."""
     saved, earlier = _saved(path, mark), load_result(path)
     changing = _arrays(engine, energy, seen)
@@ -547,10 +545,12 @@ def _resumed(path: Path, mark: str, engine: Engine, energy: EnergyWatch, seen: S
     for name, array in changing.items():
         array[...] = saved.arrays[name]
     assert isinstance(kept, Measured)
-    kept.memory = saved.memory
+    kept.memory = {name: of for name, of in saved.memory.items() if not name.startswith(MEMORY)}
     kept.parts.append(dict(earlier.quantities))
     kept.times.append(earlier.time)
-    return _Run(engine, energy, kept, seen, saved.steps)
+    if watcher is not None:
+        watcher.go_on(saved)
+    return _Run(engine, energy, kept, seen, saved.steps, watcher)
 
 
 def _check_resumed(done: int, steps: int, step: float) -> None:
