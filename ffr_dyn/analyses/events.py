@@ -44,6 +44,7 @@ from ffr_prep.common.errors import InputError
 WIDTH = 4 * np.finfo(float).eps  # of a step, and relative: what brentq can reach
 NARROW = 1e-4  # of a step, to which the moment is found at which a quantity is farthest
 REACH = 2.0  # of the last step: how near to a value a quantity that may pass it and come back has come
+TAIL_ROWS = 2  # that are kept of those that were looked at, for what the next ones tell of the last step
 AT_ONCE = 1e-6  # of a step: moments that are nearer to each other are one
 ROUNDING = 1e-14  # of the times of a run: no moment is known better
 SHOWN = 3  # times in a note
@@ -130,14 +131,15 @@ class Watcher:
         self._seen = [_seen(system, event) for event in self.events]
         self._system, self._method, self._gains, self._spacing = system, method, gains, spacing
         self._memory: list[Any] = [None] * len(self.events)
-        self._tail: Record | None = None  # the last two rows, or the first; the memory is of the first of them
+        self._tail: Record | None = (
+            None  # the last rows; the memory is of those before them, as work counts no row twice
+        )
 
     def begin(self, engine: Engine, time: float) -> None:
         """Take the state of a run's engine as what comes before the first row."""
         first = new_record(self._system, 1)
         record_row(engine, time, first, 0)  # with which the run has begun
         self._tail = self._complete(first)
-        self._memory = [seen(self._tail, None)[1] for seen in self._seen]
 
     def state(self) -> tuple[dict[str, Array], Memory]:
         """What a run goes on with from its last row, for a `Checkpoint`: arrays, and what quantities remember."""
@@ -166,9 +168,10 @@ class Watcher:
                 self.found += [of for of, *_ in located if self._at_once(of, found) and of not in self.found]
                 before = [column[known:row] for column in joined]
                 return Record(*(np.concatenate(pair) for pair in zip(before, at_event, strict=True))), True
-        passed = Record(*(column[:-1] for column in joined))
-        self._memory = [seen(passed, memory)[1] for seen, memory in zip(self._seen, self._memory, strict=True)]
-        self._tail = Record(*(column[-2:].copy() for column in joined))
+        if joined.time.size > TAIL_ROWS:
+            gone = Record(*(column[:-TAIL_ROWS] for column in joined))
+            self._memory = [seen(gone, memory)[1] for seen, memory in zip(self._seen, self._memory, strict=True)]
+        self._tail = Record(*(column[-TAIL_ROWS:].copy() for column in joined))
         return rows, False
 
     def _at_once(self, one: Mapping[str, Any], other: Mapping[str, Any]) -> bool:

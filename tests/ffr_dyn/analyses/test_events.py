@@ -12,16 +12,18 @@ from scipy.integrate import solve_ivp
 from synthetic import cloud
 
 from ffr_dyn import cli
-from ffr_dyn.analyses import registry
+from ffr_dyn.analyses import integration, registry
 from ffr_dyn.analyses.events import Event
 from ffr_dyn.analyses.forward import forward
 from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.analyses.run import run
+from ffr_dyn.functions.formula import formula
 from ffr_dyn.functions.time_functions import polynomial
 from ffr_dyn.integrators import HHT, RK4, ROS2, ROS3, DormandPrince, GeneralisedAlpha, Within
 from ffr_dyn.integrators.stabilisation import Projection
 from ffr_dyn.integrators.tolerances import tolerances
 from ffr_dyn.results.file import load_result
+from ffr_dyn.scene.forces import Load
 from ffr_dyn.scene.joints import Joint
 from ffr_dyn.scene.scene import Body, Scene
 from ffr_dyn.scene.sensors import Measurement
@@ -96,6 +98,19 @@ def test_a_value_that_is_passed_twice_within_a_step_is_an_event_twice(below, top
     assert [event["rising"] for event in result.attributes["events"] if event["event"] == "both"] == [True, False]
     ended = run(events=[Event("down", y, value, direction="falling", stop=True)])
     assert ended.time[-1] == pytest.approx(root[1], abs=1e-11)
+
+
+@pytest.mark.parametrize("rows", [1, 50])
+def test_moments_of_work_are_of_the_order_of_the_method(monkeypatch, rows):
+    """Of a ball of 1 kg under 10 N cos 3 t: its work is (10/3 sin 3 t)^2 / 2. Rows at which a run looks at once were counted
+    twice: the moment was of order two, and changed with the rows that the machine had time for (7.6e-5 s, 1.4e-4 s)."""
+    monkeypatch.setattr(integration, "MOST_ROWS", rows)
+    scene = Scene((Body("ball", BALL),), loads=(Load("push", "ball.c", force=(formula("10 * cos(3 * t)"), 0.0, 0.0)),))
+    event, true = Event("worked", "push.work", 3.0), np.arcsin(np.sqrt(3.0 * 9 / 50)) / 3
+    found = [integrate(scene, end=0.5, output_step=0.1, method=RK4(h), events=[event]) for h in (0.01, 0.005)]
+    coarse, fine = (abs(times(one)[0] - true) for one in found)
+    assert coarse < 1e-6
+    assert coarse > 14 * fine
 
 
 def test_a_distance_that_is_least_within_a_step_passes_a_value_twice():
