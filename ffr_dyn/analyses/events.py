@@ -135,6 +135,11 @@ class Watcher:
             None  # the last rows; the memory is of those before them, as work counts no row twice
         )
 
+    @property
+    def may_end(self) -> bool:
+        """Whether an event ends the run."""
+        return any(event.stop for event in self.events)
+
     def begin(self, engine: Engine, time: float) -> None:
         """Take the state of a run's engine as what comes before the first row."""
         first = new_record(self._system, 1)

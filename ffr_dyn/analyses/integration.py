@@ -330,18 +330,24 @@ def _advance(
     count = _first_rows(system, method, substeps)
     while run.done < rows * substeps and not ends:
         chunk = new_record(system, looks * min(count, rows - run.done // substeps))
+        before = _state(run.engine) if watcher is not None and watcher.may_end else {}
         with watch:
             status = fill_rows(run.engine, chunk, start, substeps // looks)
         ready = int(steps[FILLED])
         filled = ready - ready % looks
         reached_rows = _first(chunk, ready)
-        lost = None if method.controlled else unfollowed(run.engine.system, run.engine.work, method.step, reached_rows)
-        if cause := _driver_lost(run, method, start, reached_rows, status, lost):
+        cause, lost = _lost(run, method, start, reached_rows, status)
+        if cause and not (before and filled):
             raise ComputationError(cause)
         if filled:
             kept = with_all_reactions(assembled, _first(reached_rows, filled))
             if watcher is not None:
-                kept, ends = watcher.look(kept)
+                kept, ends = _looked(watcher, kept, cause)
+            if ends:
+                status, filled = OK, kept.time.size - 1
+                cause, lost = _lost(run, method, start, _again(run.engine, before, filled, start), OK)
+            if cause:
+                raise ComputationError(cause)
             _look(run, kept)
             if run.engine.work.independence[LEAST] < AT:
                 kept = with_limits(system, assembled.all_rows, kept)
@@ -353,13 +359,45 @@ def _advance(
                 raise ComputationError(lost.text)
             run.done += filled // looks * substeps
             yield times, part
-        if status != OK and not ends:
+        if status != OK:
             _require_soft(run, method, status, reached(run.engine, start))
             gained = run.energy.gains
             branches = BRANCHES if run.done == 0 and BRANCHES in assembled.notes else ""
             settings = failing.Settings(method, gained[2] > 0, excess_of_gains(gained, run.energy.spacing), branches)
             raise failing.failure(run.engine.system, run.engine.work, status, reached(run.engine, start), settings)
         count = int(min(max(count * SECONDS_PER_CALL / max(watch.last, 1e-6), 1), 10 * count))
+
+
+def _looked(watcher: Watcher, rows: Record, cause: str) -> tuple[Record, bool]:
+    """What a watcher finds in rows, of which a cause tells why they may be none; ComputationError with it where they are."""
+    try:
+        return watcher.look(rows)
+    except (InputError, ComputationError):
+        if cause:
+            raise ComputationError(cause) from None
+        raise
+
+
+def _state(engine: Engine) -> dict[str, Array]:
+    """A copy of all that an engine changes."""
+    return {name: array.copy() for name, array in _changing(engine)}
+
+
+def _again(engine: Engine, before: Mapping[str, Array], count: int, start: float) -> Record:
+    """So many steps from a state before, so that an engine has gone no farther than the event that ends a run: what comes
+    after it is neither counted nor told."""
+    for name, array in _changing(engine):
+        array[...] = before[name]
+    rows = new_record(engine.system, count)
+    if count:
+        fill_rows(engine, rows, start, 1)
+    return rows
+
+
+def _lost(run: _Run, method: Integrator, start: float, rows: Record, status: int) -> tuple[str, Lost | None]:
+    """Why the steps up to these rows follow no motion, if they do not, and where."""
+    lost = None if method.controlled else unfollowed(run.engine.system, run.engine.work, method.step, rows)
+    return _driver_lost(run, method, start, rows, status, lost), lost
 
 
 def _first(rows: Record, count: int) -> Record:

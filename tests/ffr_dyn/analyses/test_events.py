@@ -23,6 +23,7 @@ from ffr_dyn.integrators import HHT, RK4, ROS2, ROS3, DormandPrince, Generalised
 from ffr_dyn.integrators.stabilisation import Projection
 from ffr_dyn.integrators.tolerances import tolerances
 from ffr_dyn.results.file import load_result
+from ffr_dyn.scene.drivers import Driver
 from ffr_dyn.scene.forces import Load
 from ffr_dyn.scene.joints import Joint
 from ffr_dyn.scene.scene import Body, Scene
@@ -159,6 +160,29 @@ def test_what_would_fail_after_the_event_that_ends_a_run_is_not_run():
     result = forward(scene, end=2.0, output_step=0.1, events=[wound])
     assert times(result) == pytest.approx([0.5], abs=1e-9)
     assert result.attributes["errors"]["ball.R"][0] < 1e-6
+
+
+@pytest.mark.parametrize("rows", [1, 7, 1000])
+@pytest.mark.parametrize("after", ["3 * step(t - 0.6)", "100 * (t - 0.6)**2 * step(t - 0.6)"])
+def test_a_run_that_an_event_ends_knows_nothing_of_what_comes_after_it(monkeypatch, after, rows):
+    """A driver that jumps, or is followed badly, a tenth of a second later: the run was refused, or told so at 1 s, and its
+    counts were those of up to 1000 rows beyond."""
+    monkeypatch.setattr(integration, "MOST_ROWS", rows)
+    bar = rigid_body("bar", mass=1.0, inertia=(0.1, 0.1, 0.1), points={"a": (0, 0, 0)})
+    hinge = Joint("hinge", "revolute", "ground.O", "bar.a")
+    half, never = Event("half", "hinge.angle", 0.5, stop=True), Event("never", "hinge.angle", 9.0)
+    runs = [
+        integrate(
+            Scene((Body("bar", bar),), (hinge,), (Driver("motor", "hinge", formula(law)),), ground={"O": (0, 0, 0)}),
+            end=end, output_step=0.01, method=ROS2(1e-3), events=[event],
+        )
+        for law, end, event in ((f"t + {after}", 1.0, half), ("t", 0.5, never))
+    ]  # fmt: skip
+    ended, short = (run.attributes for run in runs)
+    assert runs[0].time[-1] == pytest.approx(0.5, abs=1e-9)
+    assert ended["notes"] == short["notes"] == []
+    assert 0 <= short["evaluations"] - ended["evaluations"] <= 10  # those of the step that the event cuts
+    assert ended["largest_drift"] == pytest.approx(short["largest_drift"], rel=0.1)
 
 
 def test_a_python_function_and_a_quantity_give_the_same_moment():
