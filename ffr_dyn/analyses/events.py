@@ -1,12 +1,12 @@
 """Events of a forward run: moments at which a quantity passes a value.
 
-Every step of the integrator is looked at (ten states from row to row where it chooses its steps). Where the quantity has
-passed the value within one, the step is done again, from the same state and shorter, until its end is the event: a root of
-one unknown, the length of the step, which Brent's method (1973) finds to the rounding of the time. Where it came so near that
-it may have passed the value and come back, the step is done again until the quantity is farthest, and where it is beyond the
-value there, both moments are found. ROS2 does it again where a method goes on from what it remembers, or iterates on
-positions, which is lost in rounding in so short a step. So an event is as accurate as the method, and lies on the constraints
-as it does.
+Every step of the integrator is looked at (ten states from row to row where it chooses its steps), and every part of steps
+that functions of time divide, as pulses do. Where the quantity has passed the value within one, the step is done again,
+from the same state and shorter, until its end is the event: a root of one unknown, the length of the step, which Brent's
+method (1973) finds to the rounding of the time. Where it came so near that it may have passed the value and come back, the
+step is done again until the quantity is farthest, and where it is beyond the value there, both moments are found. ROS2 does
+it again where a method goes on from what it remembers, or iterates on positions, which is lost in rounding in so short a
+step. So an event is as accurate as the method, and lies on the constraints as it does.
 
 How accurate that is, the same events of runs with other steps tell, as they tell the error of every output. Where a quantity
 vibrates at a frequency that steps do not resolve, it is its amplitude over the rate at which the quantity passes the value:
@@ -64,7 +64,7 @@ class Event:
     stop      : the run ends there
 
     An event is seen when the quantity is on the two sides of the value at the two ends of a step of the integrator, and when
-    it passes the value and comes back once within a step.
+    it passes the value and comes back once within a step. Steps that functions of time divide are looked at part by part.
 
     Raises InputError for another direction, and a value that is not finite.
 
@@ -110,7 +110,8 @@ _Located = tuple[dict[str, Any], Event, int, Record]
 
 class Watcher:
     """Looks for events in the rows of a run, one for each step. `found` lists them as plain data; `ended_by` is the name of
-    the one that has ended the run. `complete` gives rows the reactions of redundant rows."""
+    the one that has ended the run. `complete` gives rows the reactions of redundant rows; `divisions` (K,) are the times [s]
+    at which steps are divided, where functions of time are fast."""
 
     def __init__(
         self,
@@ -120,6 +121,7 @@ class Watcher:
         spacing: float,
         events: Sequence[Event],
         complete: Callable[[Record], Record],
+        divisions: Array,
     ) -> None:
         self._complete = complete
         self.events, self.found = tuple(events), list[dict[str, Any]]()
@@ -131,9 +133,8 @@ class Watcher:
         self._seen = [_seen(system, event) for event in self.events]
         self._system, self._method, self._gains, self._spacing = system, method, gains, spacing
         self._memory: list[Any] = [None] * len(self.events)
-        self._tail: Record | None = (
-            None  # the last rows; the memory is of those before them, as work counts no row twice
-        )
+        self._divisions = np.sort(divisions)
+        self._tail: Record | None = None  # the last rows; the memory is of those before: work counts no row twice
 
     @property
     def may_end(self) -> bool:
@@ -193,18 +194,45 @@ class Watcher:
 
     def _crossings(self, rows: Record, first: int) -> Iterator[_Crossing]:
         """Of the steps that begin with row `first` or a later one."""
+        parted = {k: self._parted(rows, k) for k in np.flatnonzero(self._are_divided(rows)).tolist() if k >= first}
         for number, event in enumerate(self.events):
-            values = self._seen[number](rows, self._memory[number])[0] - event.value
+            seen = self._seen[number]
+            values = seen(rows, self._memory[number])[0] - event.value
             wanted = {"rising": (True,), "falling": (False,), "either": (True, False)}[event.direction]
             once, back = passed(values), turned(values)
             for k in range(first, values.size - 1):
-                if once[k] or back[k]:
-                    memory = self._seen[number](Record(*(column[: k + 1] for column in rows)), self._memory[number])[1]
+                if once[k] or back[k] or k in parted:
+                    memory = seen(Record(*(column[: k + 1] for column in rows)), self._memory[number])[1]
                     ends = (values[k], values[k + 1])
-                    parts = self._once(ends) if once[k] else self._there_and_back(rows, number, k, ends, memory)
+                    if k in parted:
+                        inner = seen(parted[k], memory)[0] - event.value
+                        parts = self._between(parted[k].time - rows.time[k], np.array([ends[0], *inner, ends[1]]))
+                    else:
+                        parts = self._once(ends) if once[k] else self._there_and_back(rows, number, k, ends, memory)
                     for rising, rate, within in parts:
                         if rising in wanted:
                             yield _Crossing(number, k + 1, rising, rate, memory, within)
+
+    def _are_divided(self, rows: Record) -> Array:
+        """(T - 1,) whether steps from each row to the next are."""
+        found: Array = np.diff(np.searchsorted(self._divisions, rows.time)) > 0
+        return found
+
+    def _parted(self, rows: Record, k: int) -> Record:
+        """Rows where the step from row k is divided, of steps from each to the next."""
+        begin, end, near = rows.time[k], rows.time[k + 1], WIDTH * self._spacing
+        times = self._divisions[(self._divisions > begin + near) & (self._divisions < end - near)]
+        found = [Record(*(column[k : k + 1] for column in rows))]
+        for length in np.diff(times, prepend=begin).tolist():
+            found.append(self._redone(found[-1], 0, length))
+        return Record(*(np.concatenate(columns)[1:] for columns in zip(*found, strict=True)))
+
+    def _between(self, lengths: Array, values: Array) -> Iterator[_Part]:
+        """The parts of a step, divided at these lengths (K,), in which the values (K + 2,) at their ends pass zero."""
+        ends = np.array([WIDTH * self._spacing, *lengths, self._spacing])
+        for k in np.flatnonzero(passed(values)).tolist():
+            rise, time = float(values[k + 1] - values[k]), float(ends[k + 1] - ends[k])
+            yield rise > 0, rise / time, (float(ends[k]), float(ends[k + 1]))
 
     def _once(self, ends: tuple[float, float]) -> Iterator[_Part]:
         """The whole step, at the ends of which the quantity is on the two sides."""

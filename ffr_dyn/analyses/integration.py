@@ -18,7 +18,7 @@ from ffr_dyn.analyses.energy import EnergyWatch
 from ffr_dyn.analyses.events import MEMORY, Event, Watcher
 from ffr_dyn.closing.limits import with_limits
 from ffr_dyn.closing.passed_positions import passed_in_words
-from ffr_dyn.compile.divided_steps import Fast, divided, fast_of
+from ffr_dyn.compile.divided_steps import Fast, divided, division_times, fast_of
 from ffr_dyn.compile.engine import Engine, fill_rows, new_engine, record_row
 from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.compile.workspace import new_record
@@ -133,7 +133,7 @@ def integrate(
     assembled = _with_divided_steps(assembled, fast, spacing)
     header = _header(scene, assembled, method, stabilisation, (start, end, output_step))
     kept = _kept(assembled.system, wanted, rows) if path is None and not events else Measured(assembled.system, wanted)
-    watcher = _watcher(assembled, method, stabilisation, spacing, events)
+    watcher = _watcher(assembled, method, stabilisation, spacing, events, fast)
     run = _begun(assembled, method, stabilisation, start, spacing, kept, resume, mark, fast, watcher)
     _check_resumed(run.done, substeps * rows, output_step / substeps)
     with nullcontext() if path is None else _writer(path, scene, run, header, mark) as writer:
@@ -451,11 +451,19 @@ def _shown(rows: int, looks: int, ends: bool) -> Array:
 
 
 def _watcher(
-    assembled: Assembled, method: Integrator, stabilisation: Stabilisation, spacing: float, events: Sequence[Event]
+    assembled: Assembled,
+    method: Integrator,
+    stabilisation: Stabilisation,
+    spacing: float,
+    events: Sequence[Event],
+    fast: Fast | None,
 ) -> Watcher | None:
     """The search for events; None where there are none."""
+    if not events:
+        return None
+    times = np.zeros(0) if fast is None else division_times(fast, spacing)
     complete = partial(with_all_reactions, assembled)
-    return Watcher(assembled, method, gains(stabilisation), spacing, events, complete) if events else None
+    return Watcher(assembled, method, gains(stabilisation), spacing, events, complete, times)
 
 
 def _passed(watcher: Watcher) -> dict[str, Any]:

@@ -101,6 +101,22 @@ def test_a_value_that_is_passed_twice_within_a_step_is_an_event_twice(below, top
     assert ended.time[-1] == pytest.approx(root[1], abs=1e-11)
 
 
+@pytest.mark.parametrize("method", [RK4(0.01), ROS2(0.01), DormandPrince()], ids=lambda one: type(one).__name__)
+def test_what_happens_in_a_pulse_within_a_step_is_an_event(method):
+    """A force of F exp(-((t - t0) / s)^2) on a ball of 1 kg is its acceleration, which passes a limit at t0 -+ s sqrt(ln(F /
+    limit)): within a twentieth of a step, at the ends of which it is zero. A run that was to end there went on."""
+    t0, s = 0.0437, 2.5e-4
+    force = formula(f"1000 * exp(-((t - {t0}) / {s})**2)")
+    scene = Scene((Body("ball", BALL),), loads=(Load("shock", "ball.c", force=(force, 0.0, 0.0)),))
+    x = "ball.c.acceleration.x"
+    events = [Event("limit", x, 300.0), Event("end", x, 300.0, direction="falling", stop=True), Event("no", x, 1001.0)]
+    result = forward(scene, end=0.2, output_step=0.02, method=method, events=events, check=False)
+    half = s * np.sqrt(np.log(1000 / 300))
+    np.testing.assert_allclose(times(result, "limit"), [t0 - half, t0 + half], rtol=0, atol=1e-14)
+    assert times(result, "no") == []
+    assert result.time[-1] == pytest.approx(t0 + half, abs=1e-14)
+
+
 @pytest.mark.parametrize("rows", [1, 50])
 def test_moments_of_work_are_of_the_order_of_the_method(monkeypatch, rows):
     """Of a ball of 1 kg under 10 N cos 3 t: its work is (10/3 sin 3 t)^2 / 2. Rows at which a run looks at once were counted
