@@ -208,6 +208,15 @@ def test_what_cannot_be_exported_is_named(tmp_path, name, names, message):
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.parametrize("suffix", ["vtkhdf", "pvd", "glb"])
+def test_results_without_motion_are_answered_by_what_they_hold(tmp_path, suffix):
+    """A response was told to run its scene with other outputs, which it does not have."""
+    gain = fd.Quantity(np.ones(2), "m/N")
+    result = fd.Result(np.zeros(2), {"frequency": gain, "gain": gain}, {}, {"analysis": "frequency response"})
+    with pytest.raises(InputError, match=r"'frequency response' has no motion .*as \.csv or \.mat: frequency, gain"):
+        fd.export(result, tmp_path / f"a.{suffix}")
+
+
 def test_the_command_exports(tmp_path):
     path = fd.save_result(rotating_box(), tmp_path / "r.nc")
     for suffix in ("vtkhdf", "pvd", "glb", "mat", "csv"):

@@ -264,6 +264,7 @@ PICTURES = [
     told("stress run.nc --point 1,2 -o out", f"stress run.nc --point {','.join(map(str, CORNER))} -o out"),
     told("animate run.nc --scale big -o film.html", "animate run.nc --scale 2 -o film.html"),
     Case(p(for_matlab), p(for_matlab, ["rod-1.R"])),
+    Case(p(shown, lambda: ROWS), p(pictured, plot, POSITION)),
 ]
 DEADLINES = [
     Case(p(measure_steps, HINGED, ROS2(1e-3), duration=0.0), p(measure_steps, HINGED, ROS2(1e-3), duration=0.01)),
