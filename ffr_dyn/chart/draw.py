@@ -89,7 +89,7 @@ def draw_chart(
             words = diagram.measure(measure).words
             axes.set_title(words if len(shown) == 1 else plain(f"{diagram.title}: {words}"), fontsize=11.5)
         _legend(figure, grid[-1] if inside else None, handles, sum(len(diagram.lost) for diagram in shown))
-        figure.suptitle(plain(title or f"{shown[0].title}: work and precision"), fontweight="bold", x=0.01, ha="left")
+        figure.suptitle(title or plain(f"{shown[0].title}: work and precision"), fontweight="bold", x=0.01, ha="left")
         return _written(figure, path)
 
 
