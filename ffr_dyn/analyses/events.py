@@ -30,11 +30,13 @@ from ffr_dyn.compile.engine import Engine, fill_rows, new_engine, record_row
 from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.compile.workspace import new_record
 from ffr_dyn.consistency.assemble import Assembled
+from ffr_dyn.consistency.evaluation import joined
 from ffr_dyn.consistency.failure import Settings, failure
 from ffr_dyn.consistency.step_error import Beside, StepError, step_errors
 from ffr_dyn.equations.state_view import StateView
 from ffr_dyn.integrators import ROS2, Integrator
 from ffr_dyn.kernels.tables import OK, Record
+from ffr_dyn.results.power import Worked
 from ffr_dyn.results.quantities import Entry, Memory, catalogue
 from ffr_dyn.results.recorded_motion import View
 from ffr_dyn.results.result import Quantity, Result
@@ -165,19 +167,18 @@ class Watcher:
         """The rows that belong to the run, and whether it ends: the last row is that of the event then."""
         assert self._tail is not None
         known = self._tail.time.size
-        joined = Record(*(np.concatenate(pair) for pair in zip(self._tail, rows, strict=True)))
-        located = self._in_order(self._located(joined, crossing) for crossing in self._crossings(joined, known - 1))
+        whole = joined([self._tail, rows])
+        located = self._in_order(self._located(whole, crossing) for crossing in self._crossings(whole, known - 1))
         for found, event, row, at_event in located:
             self.found.append(found)
             if event.stop:
                 self.ended_by = event.name
                 self.found += [of for of, *_ in located if self._at_once(of, found) and of not in self.found]
-                before = [column[known:row] for column in joined]
-                return Record(*(np.concatenate(pair) for pair in zip(before, at_event, strict=True))), True
-        if joined.time.size > TAIL_ROWS:
-            gone = Record(*(column[:-TAIL_ROWS] for column in joined))
+                return joined([Record(*(column[known:row] for column in whole)), at_event]), True
+        if whole.time.size > TAIL_ROWS:
+            gone = Record(*(column[:-TAIL_ROWS] for column in whole))
             self._memory = [seen(gone, memory)[1] for seen, memory in zip(self._seen, self._memory, strict=True)]
-        self._tail = Record(*(column[-TAIL_ROWS:].copy() for column in joined))
+        self._tail = Record(*(column[-TAIL_ROWS:].copy() for column in whole))
         return rows, False
 
     def _at_once(self, one: Mapping[str, Any], other: Mapping[str, Any]) -> bool:
@@ -225,7 +226,7 @@ class Watcher:
         found = [Record(*(column[k : k + 1] for column in rows))]
         for length in np.diff(times, prepend=begin).tolist():
             found.append(self._redone(found[-1], 0, length))
-        return Record(*(np.concatenate(columns)[1:] for columns in zip(*found, strict=True)))
+        return Record(*(column[1:] for column in joined(found)))
 
     def _between(self, lengths: Array, values: Array) -> Iterator[_Part]:
         """The parts of a step, divided at these lengths (K,), in which the values (K + 2,) at their ends pass zero."""
@@ -256,8 +257,13 @@ class Watcher:
             yield side > 0, climbing / (whole - farthest), (farthest, whole)
 
     def _over(self, rows: Record, number: int, k: int, length: float, memory: Any) -> float:
-        """By how much the quantity is over the value at the end of a step of this length from row k."""
-        return float(self._seen[number](self._redone(rows, k, length), memory)[0][0]) - self.events[number].value
+        """By how much the quantity is over the value at the end of a step of this length from row k. Work is added up by
+        Simpson's rule: its own formula is of equal steps."""
+        found = [self._redone(rows, k, length)]
+        if isinstance(memory, Worked):
+            found = [Record(*(column[k : k + 1] for column in rows)), self._redone(rows, k, length / 2), *found]
+            memory = replace(memory, powers=())
+        return float(self._seen[number](joined(found), memory)[0][-1]) - self.events[number].value
 
     def _located(self, rows: Record, crossing: _Crossing) -> _Located:
         event, k = self.events[crossing.number], crossing.row - 1

@@ -123,11 +123,15 @@ def test_moments_of_work_are_of_the_order_of_the_method(monkeypatch, rows):
     twice: the moment was of order two, and changed with the rows that the machine had time for (7.6e-5 s, 1.4e-4 s)."""
     monkeypatch.setattr(integration, "MOST_ROWS", rows)
     scene = Scene((Body("ball", BALL),), loads=(Load("push", "ball.c", force=(formula("10 * cos(3 * t)"), 0.0, 0.0)),))
-    event, true = Event("worked", "push.work", 3.0), np.arcsin(np.sqrt(3.0 * 9 / 50)) / 3
-    found = [integrate(scene, end=0.5, output_step=0.1, method=RK4(h), events=[event]) for h in (0.01, 0.005)]
-    coarse, fine = (abs(times(one)[0] - true) for one in found)
-    assert coarse < 1e-6
-    assert coarse > 14 * fine
+    works = np.array([1.0, 1.7, 2.3, 3.0, 3.3, 4.1])
+    events = [Event(f"{work}", "push.work", work, direction="rising") for work in works]
+    true = np.arcsin(np.sqrt(works * 9 / 50)) / 3
+    coarse, fine = (
+        np.abs(np.array(times(integrate(scene, end=0.5, output_step=0.1, method=RK4(h), events=events))) - true).max()
+        for h in (0.01, 0.005)
+    )
+    assert coarse < 1e-7
+    assert coarse > 12 * fine
 
 
 def test_a_distance_that_is_least_within_a_step_passes_a_value_twice():
