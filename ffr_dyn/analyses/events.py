@@ -112,8 +112,9 @@ _Located = tuple[dict[str, Any], Event, int, Record]
 
 class Watcher:
     """Looks for events in the rows of a run, one for each step. `found` lists them as plain data; `ended_by` is the name of
-    the one that has ended the run. `complete` gives rows the reactions of redundant rows; `divisions` (K,) are the times [s]
-    at which steps are divided, where functions of time are fast."""
+    the one that has ended the run, `last_step` the beginning, the middle and the end of the step up to it. `complete` gives
+    rows the reactions of redundant rows; `divisions` (K,) are the times [s] at which steps are divided, where functions of
+    time are fast."""
 
     def __init__(
         self,
@@ -136,6 +137,7 @@ class Watcher:
         self._system, self._method, self._gains, self._spacing = system, method, gains, spacing
         self._memory: list[Any] = [None] * len(self.events)
         self._divisions = np.sort(divisions)
+        self.last_step: Record | None = None
         self._tail: Record | None = None  # the last rows; the memory is of those before: work counts no row twice
 
     @property
@@ -174,12 +176,19 @@ class Watcher:
             if event.stop:
                 self.ended_by = event.name
                 self.found += [of for of, *_ in located if self._at_once(of, found) and of not in self.found]
+                self.last_step = self._in_halves(whole, row - 1, at_event)
                 return joined([Record(*(column[known:row] for column in whole)), at_event]), True
         if whole.time.size > TAIL_ROWS:
             gone = Record(*(column[:-TAIL_ROWS] for column in whole))
             self._memory = [seen(gone, memory)[1] for seen, memory in zip(self._seen, self._memory, strict=True)]
         self._tail = Record(*(column[-TAIL_ROWS:].copy() for column in whole))
         return rows, False
+
+    def _in_halves(self, rows: Record, k: int, end: Record) -> Record:
+        """Row k, the middle of a step from it, and its end."""
+        length = max(float(end.time[0] - rows.time[k]), WIDTH * self._spacing)  # which may be rounding of the times
+        middle = self._redone(rows, k, length / 2)
+        return joined([Record(*(column[k : k + 1] for column in rows)), middle, end])
 
     def _at_once(self, one: Mapping[str, Any], other: Mapping[str, Any]) -> bool:
         return bool(abs(one["time"] - other["time"]) <= AT_ONCE * self._spacing)
@@ -259,11 +268,10 @@ class Watcher:
     def _over(self, rows: Record, number: int, k: int, length: float, memory: Any) -> float:
         """By how much the quantity is over the value at the end of a step of this length from row k. Work is added up by
         Simpson's rule: its own formula is of equal steps."""
-        found = [self._redone(rows, k, length)]
+        end = self._redone(rows, k, length)
         if isinstance(memory, Worked):
-            found = [Record(*(column[k : k + 1] for column in rows)), self._redone(rows, k, length / 2), *found]
-            memory = replace(memory, powers=())
-        return float(self._seen[number](joined(found), memory)[0][-1]) - self.events[number].value
+            end, memory = self._in_halves(rows, k, end), replace(memory, powers=())
+        return float(self._seen[number](end, memory)[0][-1]) - self.events[number].value
 
     def _located(self, rows: Record, crossing: _Crossing) -> _Located:
         event, k = self.events[crossing.number], crossing.row - 1

@@ -351,7 +351,7 @@ def _advance(
             _look(run, kept)
             if run.engine.work.independence[LEAST] < AT:
                 kept = with_limits(system, assembled.all_rows, kept)
-            part = run.kept.add(View(system, kept), _shown(kept.time.size, looks, ends))
+            part = _added(run, View(system, kept), _shown(kept.time.size, looks, ends))
             times = run.kept.times[-1]
             if nonsense := meaningless(system.scene, run.seen.arrays["bodies"]):
                 raise ComputationError(f"by t = {times[-1]:.6g} s {nonsense}")
@@ -366,6 +366,14 @@ def _advance(
             settings = failing.Settings(method, gained[2] > 0, excess_of_gains(gained, run.energy.spacing), branches)
             raise failing.failure(run.engine.system, run.engine.work, status, reached(run.engine, start), settings)
         count = int(min(max(count * SECONDS_PER_CALL / max(watch.last, 1e-6), 1), 10 * count))
+
+
+def _added(run: _Run, view: View, shown: Array) -> dict[str, Quantity]:
+    """The quantities of rows that follow, of which the last may be that of an event."""
+    if run.watcher is None or run.watcher.last_step is None:
+        return run.kept.add(view, shown)
+    assert isinstance(run.kept, Measured)
+    return run.kept.add(view, shown, View(view.system, run.watcher.last_step))
 
 
 def _looked(watcher: Watcher, rows: Record, cause: str) -> tuple[Record, bool]:
