@@ -15,10 +15,10 @@ import numpy as np
 
 from ffr_dyn.analyses.checkpoint import Checkpoint, decode, encode, fingerprint, leaves
 from ffr_dyn.analyses.energy import EnergyWatch
-from ffr_dyn.analyses.events import Event, Watcher
+from ffr_dyn.analyses.events import MEMORY, Event, Watcher
 from ffr_dyn.closing.limits import with_limits
 from ffr_dyn.closing.passed_positions import passed_in_words
-from ffr_dyn.compile.divided_steps import Fast, divided, fast_of
+from ffr_dyn.compile.divided_steps import Fast, divided, division_times, fast_of
 from ffr_dyn.compile.engine import Engine, fill_rows, new_engine, record_row
 from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.compile.workspace import new_record
@@ -75,13 +75,14 @@ _MOST_ROWS = 1e9  # each of hundreds of bytes at least
 @dataclass
 class _Run:
     """The part of a run that changes while it goes on; `done` counts the steps. The first row is `unseen` until others can
-    be looked at with it."""
+    be looked at with it; `watcher` looks for events, if there are any."""
 
     engine: Engine
     energy: EnergyWatch
     kept: Kept
     seen: Seen
     done: int
+    watcher: Watcher | None
     unseen: Record | None = None
 
 
@@ -128,15 +129,15 @@ def integrate(
     assembled = assemble(scene, time=start) if assembled is None else assembled
     wanted = selected(assembled.system, outputs)
     path = resume if path is None else path
-    mark = "" if path is None else _fingerprint(assembled, method, stabilisation, start, output_step, wanted)
+    mark = "" if path is None else _fingerprint(assembled, method, stabilisation, start, output_step, wanted, events)
     assembled = _with_divided_steps(assembled, fast, spacing)
     header = _header(scene, assembled, method, stabilisation, (start, end, output_step))
     kept = _kept(assembled.system, wanted, rows) if path is None and not events else Measured(assembled.system, wanted)
-    run = _begun(assembled, method, stabilisation, start, spacing, kept, resume, mark, fast)
+    watcher = _watcher(assembled, method, stabilisation, spacing, events, fast)
+    run = _begun(assembled, method, stabilisation, start, spacing, kept, resume, mark, fast, watcher)
     _check_resumed(run.done, substeps * rows, output_step / substeps)
-    watcher = _watcher(assembled, run, method, stabilisation, spacing, events, resume) if events else None
     with nullcontext() if path is None else _writer(path, scene, run, header, mark) as writer:
-        for times, part in _advance(assembled, run, method, start, substeps, rows, wanted, stopwatch, watcher):
+        for times, part in _advance(assembled, run, method, start, substeps, rows, wanted, stopwatch):
             if writer is not None:
                 writer.append(times, {name: quantity.values for name, quantity in part.items()}, _checkpoint(run, mark))
             if progress is not None:
@@ -259,6 +260,7 @@ def _begun(
     resume: str | Path | None,
     mark: str,
     fast: Fast | None,
+    watcher: Watcher | None,
 ) -> _Run:
     """The run at its start, or where the file to resume left it."""
     system, gained = assembled.system, gains(stabilisation)
@@ -267,11 +269,19 @@ def _begun(
     moments = np.zeros(0) if fast is None else fast.moments
     energy = EnergyWatch(system, method, gained, spacing, lambda rows: with_all_reactions(assembled, rows), moments)
     if resume is not None and Path(resume).exists():
-        return _resumed(Path(resume), mark, engine, energy, seen, kept)
-    return _started(assembled, engine, energy, seen, start, kept)
+        return _resumed(Path(resume), mark, engine, energy, seen, kept, watcher)
+    return _started(assembled, engine, energy, seen, start, kept, watcher)
 
 
-def _started(assembled: Assembled, engine: Engine, energy: EnergyWatch, seen: Seen, start: float, kept: Kept) -> _Run:
+def _started(
+    assembled: Assembled,
+    engine: Engine,
+    energy: EnergyWatch,
+    seen: Seen,
+    start: float,
+    kept: Kept,
+    watcher: Watcher | None,
+) -> _Run:
     """The run with its first row."""
     first = new_record(assembled.system, 1)
     status = record_row(engine, start, first, 0)
@@ -281,11 +291,13 @@ def _started(assembled: Assembled, engine: Engine, energy: EnergyWatch, seen: Se
     singular = engine.work.independence[HERE] < AT
     shown = with_limits(assembled.system, assembled.all_rows, first) if singular else first
     kept.add(View(assembled.system, shown), np.zeros(1, dtype=np.int64))
-    run = _Run(engine, energy, kept, seen, 0)
+    run = _Run(engine, energy, kept, seen, 0, watcher)
     if isinstance(kept, Measured):
         _look(run, first)  # a file holds what has been seen of its rows
     else:
         run.unseen = first
+    if watcher is not None:
+        watcher.begin(engine, start)
     return run
 
 
@@ -306,7 +318,6 @@ def _advance(
     rows: int,
     wanted: Mapping[str, Entry],
     stopwatch: Stopwatch | None,
-    watcher: Watcher | None = None,
 ) -> Iterator[tuple[Array, dict[str, Quantity]]]:
     """Yields (times, quantities) of output rows chunk after chunk, each about SECONDS_PER_CALL long.
 
@@ -314,27 +325,33 @@ def _advance(
     kept.
     """
     system, steps, watch = assembled.system, run.engine.tables.clock.steps, stopwatch or Stopwatch()
-    looks = substeps if needs_every_step(wanted) or watcher is not None else 1
-    ends = False
+    looks, watcher = substeps if needs_every_step(wanted) or run.watcher is not None else 1, run.watcher
+    ends = watcher is not None and watcher.ended_by is not None
     count = _first_rows(system, method, substeps)
-    while run.done < rows * substeps:
+    while run.done < rows * substeps and not ends:
         chunk = new_record(system, looks * min(count, rows - run.done // substeps))
+        before = _state(run.engine) if watcher is not None and watcher.may_end else {}
         with watch:
             status = fill_rows(run.engine, chunk, start, substeps // looks)
         ready = int(steps[FILLED])
         filled = ready - ready % looks
         reached_rows = _first(chunk, ready)
-        lost = None if method.controlled else unfollowed(run.engine.system, run.engine.work, method.step, reached_rows)
-        if cause := _driver_lost(run, method, start, reached_rows, status, lost):
+        cause, lost = _lost(run, method, start, reached_rows, status)
+        if cause and not (before and filled):
             raise ComputationError(cause)
         if filled:
             kept = with_all_reactions(assembled, _first(reached_rows, filled))
             if watcher is not None:
-                kept, ends = watcher.look(kept)
+                kept, ends = _looked(watcher, kept, cause)
+            if ends:
+                status, filled = OK, kept.time.size - 1
+                cause, lost = _lost(run, method, start, _again(run.engine, before, filled, start), OK)
+            if cause:
+                raise ComputationError(cause)
             _look(run, kept)
             if run.engine.work.independence[LEAST] < AT:
                 kept = with_limits(system, assembled.all_rows, kept)
-            part = run.kept.add(View(system, kept), _shown(kept.time.size, looks, ends))
+            part = _added(run, View(system, kept), _shown(kept.time.size, looks, ends))
             times = run.kept.times[-1]
             if nonsense := meaningless(system.scene, run.seen.arrays["bodies"]):
                 raise ComputationError(f"by t = {times[-1]:.6g} s {nonsense}")
@@ -342,8 +359,6 @@ def _advance(
                 raise ComputationError(lost.text)
             run.done += filled // looks * substeps
             yield times, part
-        if ends:
-            return
         if status != OK:
             _require_soft(run, method, status, reached(run.engine, start))
             gained = run.energy.gains
@@ -351,6 +366,46 @@ def _advance(
             settings = failing.Settings(method, gained[2] > 0, excess_of_gains(gained, run.energy.spacing), branches)
             raise failing.failure(run.engine.system, run.engine.work, status, reached(run.engine, start), settings)
         count = int(min(max(count * SECONDS_PER_CALL / max(watch.last, 1e-6), 1), 10 * count))
+
+
+def _added(run: _Run, view: View, shown: Array) -> dict[str, Quantity]:
+    """The quantities of rows that follow, of which the last may be that of an event."""
+    if run.watcher is None or run.watcher.last_step is None:
+        return run.kept.add(view, shown)
+    assert isinstance(run.kept, Measured)
+    return run.kept.add(view, shown, View(view.system, run.watcher.last_step))
+
+
+def _looked(watcher: Watcher, rows: Record, cause: str) -> tuple[Record, bool]:
+    """What a watcher finds in rows, of which a cause tells why they may be none; ComputationError with it where they are."""
+    try:
+        return watcher.look(rows)
+    except (InputError, ComputationError):
+        if cause:
+            raise ComputationError(cause) from None
+        raise
+
+
+def _state(engine: Engine) -> dict[str, Array]:
+    """A copy of all that an engine changes."""
+    return {name: array.copy() for name, array in _changing(engine)}
+
+
+def _again(engine: Engine, before: Mapping[str, Array], count: int, start: float) -> Record:
+    """So many steps from a state before, so that an engine has gone no farther than the event that ends a run: what comes
+    after it is neither counted nor told."""
+    for name, array in _changing(engine):
+        array[...] = before[name]
+    rows = new_record(engine.system, count)
+    if count:
+        fill_rows(engine, rows, start, 1)
+    return rows
+
+
+def _lost(run: _Run, method: Integrator, start: float, rows: Record, status: int) -> tuple[str, Lost | None]:
+    """Why the steps up to these rows follow no motion, if they do not, and where."""
+    lost = None if method.controlled else unfollowed(run.engine.system, run.engine.work, method.step, rows)
+    return _driver_lost(run, method, start, rows, status, lost), lost
 
 
 def _first(rows: Record, count: int) -> Record:
@@ -405,20 +460,18 @@ def _shown(rows: int, looks: int, ends: bool) -> Array:
 
 def _watcher(
     assembled: Assembled,
-    run: _Run,
     method: Integrator,
     stabilisation: Stabilisation,
     spacing: float,
     events: Sequence[Event],
-    resume: str | Path | None,
-) -> Watcher:
-    """The search for events from where the run stands."""
-    if resume is not None:
-        _check_no_events(events)
+    fast: Fast | None,
+) -> Watcher | None:
+    """The search for events; None where there are none."""
+    if not events:
+        return None
+    times = np.zeros(0) if fast is None else division_times(fast, spacing)
     complete = partial(with_all_reactions, assembled)
-    watcher = Watcher(assembled, method, gains(stabilisation), spacing, events, complete)
-    watcher.begin(run.engine, float(run.kept.times[0][0]))
-    return watcher
+    return Watcher(assembled, method, gains(stabilisation), spacing, events, complete, times)
 
 
 def _passed(watcher: Watcher) -> dict[str, Any]:
@@ -467,9 +520,12 @@ def _fingerprint(
     start: float,
     output_step: float,
     wanted: Mapping[str, Entry],
+    events: Sequence[Event],
 ) -> str:
     state = (assembled.x.tobytes(), assembled.v.tobytes())
-    return fingerprint(assembled.system.model, *state, method, stabilisation, start, output_step, list(wanted))
+    looked_for = [replace(of, quantity="") if callable(of.quantity) else of for of in events]
+    settings = (method, stabilisation, start, output_step, list(wanted), *looked_for)
+    return fingerprint(assembled.system.model, *state, *settings)
 
 
 KEY = "machine."  # before the names of an engine's tables in result files
@@ -477,7 +533,9 @@ KEY = "machine."  # before the names of an engine's tables in result files
 
 def _checkpoint(run: _Run, mark: str) -> Array:
     assert isinstance(run.kept, Measured)
-    return encode(Checkpoint(mark, run.done, _arrays(run.engine, run.energy, run.seen), run.kept.memory))
+    arrays, memory = ({}, {}) if run.watcher is None else run.watcher.state()
+    whole = _arrays(run.engine, run.energy, run.seen) | arrays
+    return encode(Checkpoint(mark, run.done, whole, {**run.kept.memory, **memory}))
 
 
 def _arrays(engine: Engine, energy: EnergyWatch, seen: Seen) -> dict[str, Array]:
@@ -508,17 +566,9 @@ def check_continues(
 ) -> None:
     """Raises InputError where the run that a result file holds does not go on with these settings; what `others` there are
     does not matter."""
-    _check_no_events(events)
     wanted = selected(assembled.system, outputs)
-    saved = _saved(Path(path), _fingerprint(assembled, method, stabilisation, start, output_step, wanted))
+    saved = _saved(Path(path), _fingerprint(assembled, method, stabilisation, start, output_step, wanted, events))
     _check_resumed(saved.steps, round((end - start) / method.step), method.step)
-
-
-def _check_no_events(events: Sequence[Event]) -> None:
-    if events:
-        raise InputError(
-            "a run with events cannot be resumed: those of its first part are not in the file; run the whole"
-        )
 
 
 def _saved(path: Path, mark: str) -> Checkpoint:
@@ -535,7 +585,9 @@ def _saved(path: Path, mark: str) -> Checkpoint:
     return saved
 
 
-def _resumed(path: Path, mark: str, engine: Engine, energy: EnergyWatch, seen: Seen, kept: Kept) -> _Run:
+def _resumed(
+    path: Path, mark: str, engine: Engine, energy: EnergyWatch, seen: Seen, kept: Kept, watcher: Watcher | None
+) -> _Run:
     """The run that a result file holds, ready to go on in the engine."""
     saved, earlier = _saved(path, mark), load_result(path)
     changing = _arrays(engine, energy, seen)
@@ -547,10 +599,12 @@ def _resumed(path: Path, mark: str, engine: Engine, energy: EnergyWatch, seen: S
     for name, array in changing.items():
         array[...] = saved.arrays[name]
     assert isinstance(kept, Measured)
-    kept.memory = saved.memory
+    kept.memory = {name: of for name, of in saved.memory.items() if not name.startswith(MEMORY)}
     kept.parts.append(dict(earlier.quantities))
     kept.times.append(earlier.time)
-    return _Run(engine, energy, kept, seen, saved.steps)
+    if watcher is not None:
+        watcher.go_on(saved)
+    return _Run(engine, energy, kept, seen, saved.steps, watcher)
 
 
 def _check_resumed(done: int, steps: int, step: float) -> None:

@@ -159,12 +159,13 @@ def summary(attributes: Mapping[str, Any]) -> list[str]:
         lines.append(f"accuracy     {a['accuracy']}")
     if "stable" in a:
         lines.append(f"equilibrium  {'stable' if a['stable'] else 'unstable'}")
-    passed = [f"event        {_moment(event)}" for event in a.get("events", [])]
+    passed = [f"event        {moment_in_words(event)}" for event in a.get("events", [])]
     more = [f"event        ... and {len(passed) - EVENTS_SHOWN} more"] if len(passed) > EVENTS_SHOWN else []
     return lines + passed[:EVENTS_SHOWN] + more + [f"note         {note}" for note in a["notes"]]
 
 
-def _moment(event: Mapping[str, Any]) -> str:
+def moment_in_words(event: Mapping[str, Any]) -> str:
+    """An event of a result: its name, time and error."""
     said = f"{event['event']} at t = {event['time']:.9g} s"
     if "error" not in event:
         return said

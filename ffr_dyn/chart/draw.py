@@ -17,7 +17,7 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import LogFormatterSciNotation, LogLocator
 
 from ffr_dyn.chart.diagram import CPU, EVALUATIONS, WALL, Diagram, Point
-from ffr_dyn.pictures.histories import PALETTE
+from ffr_dyn.pictures.histories import PALETTE, plain
 from ffr_prep.common.errors import InputError
 from ffr_prep.common.outputs import replacing
 
@@ -87,9 +87,9 @@ def draw_chart(
         for axes, (diagram, measure) in zip(grid, panels, strict=False):
             _panel(axes, diagram, measure, against, lines)
             words = diagram.measure(measure).words
-            axes.set_title(words if len(shown) == 1 else f"{diagram.title}: {words}", fontsize=11.5)
+            axes.set_title(words if len(shown) == 1 else plain(f"{diagram.title}: {words}"), fontsize=11.5)
         _legend(figure, grid[-1] if inside else None, handles, sum(len(diagram.lost) for diagram in shown))
-        figure.suptitle(title or f"{shown[0].title}: work and precision", fontweight="bold", x=0.01, ha="left")
+        figure.suptitle(title or plain(f"{shown[0].title}: work and precision"), fontweight="bold", x=0.01, ha="left")
         return _written(figure, path)
 
 

@@ -127,7 +127,8 @@ def info(result: Path) -> None:
     for key, value in sorted(loaded.attributes.items()):
         for line in _errors(value, units) if key == "errors" else _attribute(key, value):
             click.echo(f"{key:20} {line}")
-    click.echo(f"{'rows':20} {loaded.time.size}, from {loaded.time[0]:g} to {loaded.time[-1]:g} s\n")
+    span = f", from {loaded.time[0]:g} to {loaded.time[-1]:g} s" if loaded.time.size else ""
+    click.echo(f"{'rows':20} {loaded.time.size}{span}\n")
     for name, quantity in loaded.quantities.items():
         axes = "".join(f".{{{','.join(axis.labels)}}}" for axis in quantity.axes)
         click.echo(f"{name + axes:45} [{quantity.unit}] {quantity.description}")
@@ -219,17 +220,23 @@ def _attribute(key: str, value: Any) -> list[str]:
         return [f"{', '.join(value)}: per unit acceleration, which `ffr-dyn stress` makes an error of"]
     if key == "connections":
         return [f"{name} ({of['kind']}): {', '.join(of['at']) or 'everywhere'}" for name, of in value.items()]
-    if isinstance(value, dict):
-        return [f"{name}: {', '.join(map(_short, of if isinstance(of, list) else [of]))}" for name, of in value.items()]
+    if key == "events":
+        return _events(value)
     if key == "largest_drift":
         return [f"{value[0]:.3g} of positions, {value[1]:.3g} of rates"]
-    if isinstance(value, list):
+    if isinstance(value, dict):
+        return [f"{name}: {', '.join(map(_short, of if isinstance(of, list) else [of]))}" for name, of in value.items()]
+    if isinstance(value, list) and not (value and all(isinstance(one, float) for one in value)):
         return [str(line) for line in value]
-    return [
-        f"{value:.10g}{' s' if key in ('start', 'end', 'output_step') else ''}"
-        if isinstance(value, float)
-        else str(value)
-    ]
+    listed = value if isinstance(value, list) else [value]
+    numbers = ", ".join(f"{one:.10g}" if isinstance(one, float) else str(one) for one in listed)
+    return [f"{numbers}{' s' if key in ('start', 'end', 'output_step') else ''}"]
+
+
+def _events(found: list[dict[str, Any]]) -> list[str]:
+    from ffr_dyn.analyses.registry import moment_in_words
+
+    return [f"{moment_in_words(of)}, {'rising' if of['rising'] else 'falling'}: {of['quantity']}" for of in found]
 
 
 def _short(value: Any) -> str:

@@ -273,16 +273,26 @@ def divided(system: System, fast: Fast, step: float) -> System:
     """The system, of which steps [s] end where functions that are fast ask for it: in proportion to the step."""
     if not len(fast.spans) + len(fast.jumps):
         return system
-    times = divisions(fast.spans, parts := ceil(PARTS * fast.step / step))
+    times = division_times(fast, step)
     if times.size > MOST:
         raise ComputationError(
-            f"{', '.join(fast.purposes)}: changes so often that {times.size:.2g} parts of steps, {parts} to a change, are "
-            "more than a run has room for; take a shorter step, or leave out what is too fast to matter"
+            f"{', '.join(fast.purposes)}: changes so often that {times.size:.2g} parts of steps, {_parts(fast, step)} to a "
+            "change, are more than a run has room for; take a shorter step, or leave out what is too fast to matter"
         )
     functions = system.model.functions
     breaks = _with_times(np.concatenate([functions.breaks, fast.jumps[:, [0, 1, 1]]]), times, BESIDE * step)
     piece = in_one_piece(system.model._replace(functions=functions._replace(breaks=breaks)))
     return replace(system, model=piece.tables, words=piece.words)
+
+
+def division_times(fast: Fast, step: float) -> Array:
+    """(K,) times [s] at which steps of this length [s] are divided where functions are fast."""
+    return divisions(fast.spans, _parts(fast, step))
+
+
+def _parts(fast: Fast, step: float) -> int:
+    """Parts of a change."""
+    return ceil(PARTS * fast.step / step)
 
 
 def _with_times(breaks: Array, times: Array, apart: float) -> Array:

@@ -21,6 +21,7 @@ from ffr_dyn.economy.model_choice import Choice
 from ffr_dyn.economy.result import Economy
 from ffr_dyn.economy.run import Made, Span, make, simulated
 from ffr_dyn.functions.stopwatch import Stopwatch
+from ffr_dyn.pictures.histories import plain
 from ffr_dyn.results.result import Result
 from ffr_prep.common.arrays import Array
 
@@ -72,7 +73,7 @@ def diagram(found: Economy) -> Diagram:
 
 def draw(found: Economy, path: str | Path) -> Path:
     """Draw the runs of a search and the one it chose, .png or .svg, a panel for each output."""
-    return draw_chart(diagram(found), path, title=f"{found.original.name}: what was tried, and chosen")
+    return draw_chart(diagram(found), path, title=plain(f"{found.original.name}: what was tried, and chosen"))
 
 
 def _reference(found: Economy) -> Reference:

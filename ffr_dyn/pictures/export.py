@@ -24,6 +24,12 @@ WRITERS = {
     ".csv": ("ffr_dyn.pictures.export", "write_table", "spreadsheets: all histories, a column each"),
 }
 
+_LONGEST = 63  # letters of a name in MATLAB
+_KEYWORDS = (  # of MATLAB
+    *("break", "case", "catch", "classdef", "continue", "else", "elseif", "end", "for", "function", "global", "if"),
+    *("otherwise", "parfor", "persistent", "return", "spmd", "switch", "try", "while"),
+)
+
 
 def export(result: Result, path: str | Path, names: Iterable[str] | None = None) -> Path:
     """Write a result in the format of another program, by the suffix of the path.
@@ -60,29 +66,53 @@ def write_table(result: Result, path: Path, names: Iterable[str] | None) -> Path
 
 
 def write_mat(result: Result, path: Path, names: Iterable[str] | None) -> Path:
-    """Histories as a MATLAB file: `time`, `units`, and structures by the parts of the names: rod.tip.position."""
+    """Histories as a MATLAB file: `time`, `units`, and structures by the parts of the names: rod.tip.position.
+
+    Raises InputError where two names are one in MATLAB, of which the file could hold one alone.
+    """
     from scipy.io import savemat
 
     content: dict[str, Any] = {"time": result.time[:, None], "units": {}}
+    taken: dict[tuple[str, ...], str] = {}
     for name in result.quantities if names is None else names:
-        quantity = result.quantity(name)
-        _put(content, name, quantity.values)
-        _put(content["units"], name, quantity.unit)
+        quantity, place = result.quantity(name), _place(name)
+        _check_place(path, name, place, taken)
+        _put(content, place, quantity.values)
+        _put(content["units"], place, quantity.unit)
     with replacing(path) as part, part.open("wb") as stream:
         savemat(stream, content, long_field_names=True, oned_as="column")
     return path
 
 
-def _put(tree: dict[str, Any], name: str, value: Any) -> None:
-    """At its place in structures of structures; names as MATLAB allows them."""
-    *above, last = ("".join(c if c.isalnum() and c.isascii() else "_" for c in part) for part in name.split("."))
-    for part in above:
-        below = tree.setdefault(_word(part), {})
+def _place(name: str) -> tuple[str, ...]:
+    """Where a quantity stands in structures of structures, by names that MATLAB takes: letters, digits and "_", a letter
+    first, at most 63 of them, no keyword."""
+    words = ("".join(c if c.isalnum() and c.isascii() else "_" for c in part) for part in name.split("."))
+    begun = (f"n{word}" if not word[:1].isalpha() or word in _KEYWORDS else word for word in words)
+    return tuple(word[:_LONGEST] for word in begun)
+
+
+def _check_place(path: Path, name: str, place: tuple[str, ...], taken: dict[tuple[str, ...], str]) -> None:
+    """InputError for a place that another name has."""
+    for k in range(1, len(place) + 1):
+        owner = ".".join(name.split(".")[:k])
+        other = "the units of all quantities" if place[0] == "units" else taken.setdefault(place[:k], owner)
+        if other != owner:
+            raise InputError(
+                f"{path}: {owner!r} would be {'.'.join(place[:k])!r} in MATLAB, as {other!r} is; export one of them, by "
+                f"names such as {owner + '.*'!r}, or rename one in the scene"
+            )
+
+
+def _put(tree: dict[str, Any], place: tuple[str, ...], value: Any) -> None:
+    """At its place; what has a value and parts has the value among its parts."""
+    *above, last = place
+    for word in above:
+        below = tree.setdefault(word, {})
         if not isinstance(below, dict):
-            below = tree[_word(part)] = {"values": below}
+            below = tree[word] = {"values": below}
         tree = below
-    tree[_word(last)] = value
-
-
-def _word(text: str) -> str:
-    return (text if text[:1].isalpha() else f"n{text}")[:63]
+    if isinstance(tree.get(last), dict):
+        tree[last]["values"] = value
+    else:
+        tree[last] = value

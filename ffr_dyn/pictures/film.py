@@ -222,7 +222,7 @@ def film(
     Raises InputError for no rows, no body, an unknown marker, a scale, colour or limit that cannot be used, infinite
     values, and a colour by stress when no body has stress modes.
     """
-    _require_rows(result)
+    _require_motion(result)
     return film_at(
         result,
         np.linspace(result.time[0], result.time[-1], frames),
@@ -243,7 +243,7 @@ def film_at(
     limit: float | None = None,
 ) -> Film:
     """As `film`, at the given times (F,) [s]."""
-    _require_rows(result)
+    _require_motion(result)
     if not (scale == "auto" or (isinstance(scale, int | float) and 0 <= scale < math.inf)):
         raise InputError(f"scale is {scale!r}; it must be a number that is not negative, or 'auto'")
     if limit is not None and not 0 < limit < math.inf:
@@ -272,7 +272,13 @@ def film_at(
     return Film(times, solids, links, paths, factor, deflection, low, high, shades, gravity=weight)
 
 
-def _require_rows(result: Result) -> None:
+def _require_motion(result: Result) -> None:
+    """InputError for a result that has no rows, or is of an analysis without motions of bodies."""
+    if result.quantities and not any("." in name for name in result.quantities):
+        raise InputError(
+            f"nothing to animate: the result of {result.attributes.get('analysis', 'this')!r} has no motion of bodies; plot "
+            f"its quantities, or export them as .csv or .mat: {', '.join(result.quantities)}"
+        )
     if result.time.size == 0:
         raise InputError(
             "nothing to animate: the result has no rows; its run was stopped before the first: run the scene again"

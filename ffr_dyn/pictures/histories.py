@@ -182,6 +182,11 @@ def _owner(result: Result, component: str) -> str:
     return component if component in result.quantities else _owner(result, component.rpartition(".")[0])
 
 
+def plain(text: str) -> str:
+    """A name as it is written: "$" begins no formula of matplotlib."""
+    return text.replace("$", r"\$")
+
+
 @contextmanager
 def drawing(path: str | Path, size: tuple[float, float]) -> Iterator[Figure]:
     """A figure of this size [inches] in the style of all pictures, written to `path` (.png, .svg or .pdf) at the end."""

@@ -178,7 +178,7 @@ def as_json(timing: Timing) -> dict[str, Any]:
 
 def plot_times(timing: Timing, path: str | Path) -> Path:
     """A histogram of the times on logarithmic axes, with mean, 99.9 % and deadline, as .png, .svg or .pdf."""
-    from ffr_dyn.pictures.histories import PALETTE, drawing
+    from ffr_dyn.pictures.histories import PALETTE, drawing, plain
 
     marks = {"mean": timing.mean, "99.9 %": timing.quantile(SOFT), "worst": timing.worst, "deadline": timing.deadline}
     first, last = float(np.log10(0.9 * timing.seconds.min())), float(np.log10(1.1 * max(marks.values())))
@@ -191,5 +191,5 @@ def plot_times(timing: Timing, path: str | Path) -> Path:
         axes.set_xlabel("time of a step [µs]")
         axes.set_ylabel("steps")
         axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.03))
-        axes.set_title(f"{timing.title}: {timing.seconds.size} steps of {timing.step:g} s, {timing.method}")
+        axes.set_title(plain(f"{timing.title}: {timing.seconds.size} steps of {timing.step:g} s, {timing.method}"))
     return Path(path)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 import numpy as np
@@ -17,6 +17,7 @@ import numpy as np
 from ffr_dyn.compile.scene_tables import System
 from ffr_dyn.compile.workspace import row_shapes
 from ffr_dyn.kernels.tables import Record
+from ffr_dyn.results.power import Worked
 from ffr_dyn.results.quantities import Entry, Memory, measure
 from ffr_dyn.results.recorded_motion import View
 from ffr_dyn.results.result import Histories, Quantity
@@ -47,12 +48,27 @@ class Measured:
     times: list[Array] = field(default_factory=list)
     parts: list[dict[str, Quantity]] = field(default_factory=list)
 
-    def add(self, view: View, shown: Array) -> dict[str, Quantity]:
-        every, self.memory = measure(view, self.memory, self.wanted)
+    def add(self, view: View, shown: Array, last: View | None = None) -> dict[str, Quantity]:
+        """See `Kept`. last : where the last row comes less than a step after the one before, that one, the middle between
+        them and the last one: work is added up by Simpson's rule there, as its own formula is of equal steps."""
+        every, memory = measure(view, self.memory, self.wanted)
+        every = every if last is None else self._ended(every, view, last)
+        self.memory = memory
         part = {name: _rows_of(quantity, shown) for name, quantity in every.items()}
         self.times.append(view.record.time[shown])
         self.parts.append(part)
         return part
+
+    def _ended(self, every: dict[str, Quantity], view: View, last: View) -> dict[str, Quantity]:
+        """The quantities of rows, with the works of the last one."""
+        before = self.memory
+        if len(view.record.time) > 1:
+            earlier = View(self.system, Record(*(column[:-1] for column in view.record)))
+            before = measure(earlier, before, self.wanted)[1]
+        works = {name: replace(of, powers=()) for name, of in before.items() if isinstance(of, Worked)}
+        ends = measure(last, works, {name: self.wanted[name] for name in works})[0]
+        joined = {name: np.append(every[name].values[:-1], ends[name].values[-1:]) for name in works}
+        return every | {name: replace(every[name], values=values) for name, values in joined.items()}
 
     def quantities(self) -> Mapping[str, Quantity]:
         return {

@@ -25,6 +25,7 @@ from ffr_prep.common.arrays import Array
 from ffr_prep.common.brief import Brief, Rows, cut, listed
 from ffr_prep.common.errors import InputError, require_kind
 from ffr_prep.common.outputs import replacing
+from ffr_prep.common.units import unit_of_label
 
 # netCDF names: a letter, digit or underscore first, no "/", no control character, no blank at the end.
 _NAME = re.compile(r"\w(?:[^/\x00-\x1f\x7f]*[^/\x00-\x1f\x7f\s])?")
@@ -72,7 +73,8 @@ def mode_axis(body: str, n: int) -> Axis:
 class Quantity(Brief):
     """A history, with a unit and one axis for each dimension after time.
 
-    values : (T, ...);  unit : in SI symbols, such as "m", "N m", "m/s", "m sqrt(kg)"; "1" for a number
+    values : (T, ...);  unit : in SI symbols, such as "m", "N m", "m/s", "m sqrt(kg)"; "1" for a number; where labels of the
+             first axis have their own, these with commas, "m/N, rad/N"
 
     Raises InputError for values whose shape is not that of the axes.
 
@@ -251,7 +253,7 @@ class Result(Brief):
         if owner is None or not owner.axes or label not in owner.axes[0].labels:
             return None
         index = owner.axes[0].labels.index(label)
-        return Quantity(owner.values[:, index], owner.unit, owner.axes[1:], owner.description)
+        return Quantity(owner.values[:, index], unit_of_label(owner.unit, index), owner.axes[1:], owner.description)
 
 
 @contextmanager
@@ -273,9 +275,6 @@ def table(result: Result, names: Iterable[str] | None = None) -> tuple[tuple[str
 
 def write_csv(result: Result, path: str | Path, names: Iterable[str] | None = None) -> Path:
     """Write `table` as comma-separated values (RFC 4180, shortest digits that read back exactly), atomically.
-
-    Raises InputError for unknown names and a path that is a folder or a link, ComputationError where the file cannot be
-    written.
 
     Raises InputError for unknown names and a path that is a folder or a link, ComputationError where the file cannot be
     written.

@@ -52,6 +52,7 @@ from ffr_dyn.scene_file.schema import (
     StabilisationEntry,
     fields_of_motion,
     formula_of,
+    home,
     keys_of,
     nested_kinds,
     scene_entry,
@@ -152,7 +153,10 @@ def _explained(error: ValidationError, source: Source, tree: Mapping[str, Any]) 
         text = _with_nearest(item, where, complaint(item).removeprefix("it: "))
         text = unreadable(item["input"], tree) or text if isinstance(item["input"], str) else text
         text += _of_the_angle(where, text, tree)
-        at = (*where, misspelt[1]) if (misspelt := re.match(r"'(.+?)' is not a known entry", text)) else where
+        at = where
+        if misspelt := re.match(r"'(.+?)' is not a known entry here; ", text):
+            at = (*where, misspelt[1])
+            text = f"{misspelt[0]}{elsewhere}" if (elsewhere := home(misspelt[1], where)) else text
         lines[f"{origin(source, at)}: {'.'.join(where) or 'file'}: {text}{value}"] = None
     return "; ".join(lines)
 

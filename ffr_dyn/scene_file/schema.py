@@ -549,6 +549,16 @@ def _scene_entry(words: tuple[str, ...], method_names: tuple[str, ...], forces: 
     )
 
 
+def home(key: str, where: Sequence[str]) -> str:
+    """Where an entry that stands elsewhere belongs; empty for a key that no scene has at its top or in [analysis]."""
+    if where and (of := scene_entry().model_fields.get(key)) is not None:
+        is_table = "dict" in str(of.annotation) or key in ("analysis", "chart")
+        top = f"as a table of its own, [{key}]" if is_table else "at the top of the file, before the first [table]"
+        return f"an entry of that name belongs {top}"
+    known = (_analysis_model(word, analysis(word)) for word in analyses())
+    return "it belongs in the table [analysis]" if not where and any(key in one.model_fields for one in known) else ""
+
+
 def schema() -> dict[str, Any]:
     """The JSON schema of scene files (draft 2020-12)."""
     found: dict[str, Any] = scene_entry().model_json_schema()

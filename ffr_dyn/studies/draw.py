@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -21,6 +22,7 @@ MANY = 10.0  # histories, beyond which they are drawn fainter
 TICKS = 5  # of an axis, at most: numbers such as 0.0075 need their place
 SHORT = 12  # letters of a word under its box, which stands up if it is longer
 FIRST = 9  # means of a study, before which their bands need not be seen
+BINS, MOST_BINS = 20, 100  # of a histogram beside others, and of one alone, whose widths an outlier would make too many
 FEW = 12  # values of a parameter, up to which they are thought to be chosen, and drawn as lines
 
 
@@ -51,10 +53,12 @@ def plot_study(table: Table, folder: str | Path, outputs: Sequence[str] = ()) ->
 
 
 def _drawn(table: Table, names: list[str], several: dict[str, Any], folder: Path) -> Iterator[Path]:
+    from ffr_dyn.pictures.histories import plain
+
     numbers = [name for name in names if table.outputs[name].ndim == 1]
-    label = {name: bracketed(name, pretty(table.units.get(name, ""))) for name in (*several, *table.outputs)}
+    label = {name: plain(bracketed(name, pretty(table.units.get(name, "")))) for name in (*several, *table.outputs)}
     varied = {label[name]: values for name, values in several.items() if isinstance(values, np.ndarray)}
-    texts = {name: np.array(values) for name, values in several.items() if label[name] not in varied}
+    texts = {label[name]: np.array(values) for name, values in several.items() if label[name] not in varied}
     for name in names:
         if name not in numbers and name != TIME and np.isfinite(table.outputs[name]).any():
             yield _histories(folder / f"{name}.png", label[name], table.outputs[TIME], table.outputs[name], varied)
@@ -142,7 +146,7 @@ def _row_numbers(y: Array) -> Array:
 
 
 def _over_parameters(path: Path, name: str, x: dict[str, Array], words: dict[str, Any], y: Array) -> Path:
-    from ffr_dyn.pictures.histories import PALETTE, drawing
+    from ffr_dyn.pictures.histories import PALETTE, drawing, plain
 
     with drawing(path, (4.4 * len(x | words), 3.8)) as figure:
         all_axes = figure.subplots(1, len(x | words), squeeze=False, sharey=True)[0]
@@ -158,7 +162,7 @@ def _over_parameters(path: Path, name: str, x: dict[str, Array], words: dict[str
             if key in x:
                 axes.locator_params(axis="x", nbins=TICKS)
             else:
-                axes.set_xticks(at, chosen, rotation=0 if max(map(len, chosen)) < SHORT else 90)
+                axes.set_xticks(at, map(plain, chosen), rotation=0 if max(map(len, chosen)) < SHORT else 90)
         figure.supylabel(name)
     return path
 
@@ -188,12 +192,21 @@ def _surface(path: Path, name: str, first: tuple[str, Array], second: tuple[str,
     mean = np.bincount(number.ravel(), weights=y) / np.bincount(number.ravel())
     with drawing(path, (6.4, 4.8)) as figure:
         axes = figure.subplots()
-        filled = axes.tricontourf(at[:, 0], at[:, 1], mean, levels=LEVELS)
+        filled = axes.tricontourf(triangulated(at), mean, levels=LEVELS)
         figure.colorbar(filled, ax=axes, label=name)
         axes.plot(at[:, 0], at[:, 1], "k.", markersize=4, clip_on=False)
         axes.set(xlabel=first[0], ylabel=second[0])
         axes.locator_params(nbins=TICKS)
     return path
+
+
+def triangulated(at: Array) -> Any:
+    """The triangles between points (N, 2), as `matplotlib.tri.Triangulation`. Neighbours are found in shares of the ranges:
+    those of a modulus in Pa and a diameter in m would be neighbours in the modulus alone."""
+    from matplotlib.tri import Triangulation
+
+    shares = (at - at.min(axis=0)) / np.ptp(at, axis=0)
+    return Triangulation(at[:, 0], at[:, 1], Triangulation(shares[:, 0], shares[:, 1]).triangles)
 
 
 def _mean(path: Path, name: str, y: Array) -> Path:
@@ -210,7 +223,7 @@ def _mean(path: Path, name: str, y: Array) -> Path:
         left.set(xlabel="runs", ylabel=name)
         left.legend()
         done = y[np.isfinite(y)]
-        right.hist(done, bins="auto", range=None if np.ptp(done) else _widened(done[0], done[0]), color=PALETTE[1])
+        right.hist(done, min(math.isqrt(done.size), MOST_BINS), range=_range_of_bins(done), color=PALETTE[1])
         right.set(xlabel=name, ylabel="runs")
         right.locator_params(axis="x", nbins=TICKS)
     return path
@@ -220,6 +233,13 @@ def _widened(least: float, most: float) -> tuple[float, float]:
     """A range somewhat wider, of one value, too."""
     more = 0.05 * ((most - least) or abs(least) or 1.0)
     return least - more, most + more
+
+
+def _range_of_bins(values: Array) -> tuple[float, float] | None:
+    """A range of a histogram where that of the values is too narrow for bins; None where it is not, or there are none."""
+    if not values.size or np.ptp(values) > BINS**2 * np.spacing(np.abs(values).max()):
+        return None
+    return _widened(values[0], values[0])
 
 
 def likely_errors(number: Array) -> Array:
@@ -252,8 +272,7 @@ def _pairs(path: Path, columns: dict[str, Array]) -> Path:
                 axes = grid[i][j]
                 if i == j:
                     done = columns[along][np.isfinite(columns[along])]
-                    same = _widened(done[0], done[0]) if done.size and not np.ptp(done) else None
-                    axes.hist(done, bins=20, range=same, color=PALETTE[1])
+                    axes.hist(done, bins=BINS, range=_range_of_bins(done), color=PALETTE[1])
                 else:
                     axes.plot(columns[along], columns[below], ".", color=PALETTE[0], markersize=2)
                 axes.tick_params(labelsize=6)

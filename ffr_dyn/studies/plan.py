@@ -28,6 +28,7 @@ import re
 import shlex
 from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, Literal, get_args
 
@@ -407,7 +408,18 @@ def _check_bodies(made: Study) -> None:
             raise InputError(
                 f"bodies.{name}: {line!r}: begin with a command of ffr-prep that makes a body: {', '.join(MAKING)}"
             )
-        substituted(line, made.points[0], f"bodies.{name}.make")
+        _check_lengths(name, shlex.split(recipe(made, name, made.points[0])))
+
+
+def _check_lengths(body: str, words: Sequence[str]) -> None:
+    """InputError where a parameter of a geometry script has a unit that is none of a length."""
+    for text in (text for option, text in pairwise(words) if option == "--set"):
+        quantity = split_quantity(text.partition("=")[2])
+        if quantity is not None and dimension_of(quantity[1]) != dimension_of("m"):
+            raise InputError(
+                f"bodies.{body}: --set {text}: only lengths may have a unit there, which the script has in its own; give "
+                "other numbers as the script takes them"
+            )
 
 
 def reached(texts: Iterable[str], own: Mapping[str, Any]) -> frozenset[str]:

@@ -15,6 +15,7 @@ from ffr_prep.cli.geometry import GLUE, MOST, REGIONS, SOLIDS, UNIT, faces_comma
 from ffr_prep.cli.interchange import export_body, import_body
 from ffr_prep.cli.matrices import reduce_matrices_command
 from ffr_prep.cli.options import (
+    SET,
     TIME_LIMIT,
     bundle,
     check_points,
@@ -122,7 +123,7 @@ _MESH = bundle(
     click.argument("mesh", type=INPUT_FILE),
     UNIT,
     click.option("--size", type=float, help="Largest element edge, in that unit, when geometry is meshed."),
-    click.option("--set", "numbers", multiple=True, metavar="NAME=VALUE", help="Change a parameter of a .geo script."),
+    SET,
     click.option(
         "--order",
         type=click.IntRange(1, 2),
@@ -137,7 +138,7 @@ _MESH = bundle(
 
 def _mesh_settings(options: Mapping[str, Any]) -> dict[str, Any]:
     given = ("unit", "size", "order", "glue", "solids", "most_elements")
-    return {key: options[key] for key in given} | {"numbers": numbers_of(options["numbers"])}
+    return {key: options[key] for key in given} | {"numbers": numbers_of(options["numbers"], options["unit"])}
 
 
 @cli.command(cls=NotesCommand, registries=(MESH_FORMATS,), epilog="\b\nFormats:\n{mesh format}")

@@ -10,7 +10,7 @@ from typing import Any
 
 import click
 
-from ffr_prep.cli.options import OF_VOLUME, TIME_LIMIT, bundle, interface_of, numbers_of, tell_of_programs
+from ffr_prep.cli.options import OF_VOLUME, SET, TIME_LIMIT, bundle, interface_of, numbers_of, tell_of_programs
 from ffr_prep.cli.terminal import filed, show
 from ffr_prep.common.command import INPUT_FILE, OUTPUT_FILE, reserve
 from ffr_prep.common.errors import InputError
@@ -47,14 +47,18 @@ MOST = click.option(
 _PART = bundle(
     click.argument("part", type=INPUT_FILE),
     UNIT,
-    click.option("--set", "numbers", multiple=True, metavar="NAME=VALUE", help="Change a parameter of a .geo script."),
+    SET,
     SOLIDS,
     TIME_LIMIT,
 )
 
 
 def _settings(options: Mapping[str, Any]) -> dict[str, Any]:
-    return {"unit": options["unit"], "solids": options["solids"], "numbers": numbers_of(options["numbers"])}
+    return {
+        "unit": options["unit"],
+        "solids": options["solids"],
+        "numbers": numbers_of(options["numbers"], options["unit"]),
+    }
 
 
 @click.command("faces", epilog=REGIONS)

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ffr_prep.common.errors import InputError
+from ffr_prep.common.units import split_quantity, to_si
 from ffr_prep.mesh.time_limit import USUAL, mesher_time_limit
 
 if TYPE_CHECKING:
@@ -48,6 +49,14 @@ TIME_LIMIT = click.option(
     help="Longest time that meshing a geometry may take [s].",
 )
 
+SET = click.option(
+    "--set",
+    "numbers",
+    multiple=True,
+    metavar="NAME=VALUE",
+    help="Change a parameter of a .geo script: a number in its unit, or a length such as 5cm; repeat.",
+)
+
 
 def tell_of_programs(paths: Iterable[Path]) -> None:
     """Scripts of gmsh are programs; that one is run is said."""
@@ -66,12 +75,29 @@ def gone(option: str, remedy: str) -> Decorator:
     return click.option(option, is_flag=True, hidden=True, expose_value=False, callback=refused)
 
 
-def numbers_of(settings: Sequence[str]) -> dict[str, float]:
+def numbers_of(settings: Sequence[str], unit: str | None) -> dict[str, float]:
+    """Parameters of a script by name, from NAME=VALUE: numbers in its unit (m if none is given), or lengths with their own.
+
+    >>> numbers_of(["L=5 cm", "n=3"], "mm")
+    {'L': 50.0, 'n': 3.0}
+    """
     for text in settings:
         if "=" not in text:
             raise InputError(f"--set {text}: write it as NAME=VALUE")
     pairs = [text.partition("=") for text in settings]
-    return {name.strip(): number_of(f"--set {name} (in the unit of the script)", value) for name, _, value in pairs}
+    return {name.strip(): _in_unit(name.strip(), value, unit or "m") for name, _, value in pairs}
+
+
+def _in_unit(name: str, value: str, unit: str) -> float:
+    given = split_quantity(value)
+    if given is None:
+        return number_of(f"--set {name} (in the unit of the script)", value)
+    try:
+        return float(f"{to_si(*given, 'm') / to_si(1.0, unit):.15g}")  # 300, and not 299.99999999999994
+    except InputError as error:
+        raise InputError(
+            f"--set {name}={value}: {error}; only lengths may have a unit, other numbers are as the script takes them"
+        ) from None
 
 
 def number_of(what: str, text: str) -> float:

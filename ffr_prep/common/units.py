@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Sequence
 from difflib import get_close_matches
 
 from ffr_prep.common.errors import InputError
 
+SEPARATOR = ", "  # of units of the labels of an axis
 _PREFIXES = {-9: "n", -6: "µ", -3: "m", 3: "k", 6: "M", 9: "G"}
 _TAKES_PREFIX = re.compile(r"(m|s|N|J|W|Pa|Hz)(?![\w^²³])")
 
@@ -34,6 +36,30 @@ def pretty(unit: str) -> str:
 def bracketed(name: str, unit: str) -> str:
     """A label such as "position [mm]"; without brackets for a number."""
     return f"{name} [{unit}]".strip() if unit else name
+
+
+def quotient(unit: str, by: str) -> str:
+    """The unit of one quantity over another: "m/N", "m/(N m)", "1/N"; "1" of two alike."""
+    if by in ("", "1"):
+        return unit or "1"
+    return "1" if unit == by else f"{unit or '1'}/{f'({by})' if set(by) & set(' /') else by}"
+
+
+def square(unit: str) -> str:
+    """The unit of the square: "m^2", "(m/s^2)^2"."""
+    if unit in ("", "1"):
+        return "1"
+    return f"{unit}^2" if unit.isalpha() else f"({unit})^2"
+
+
+def listed_units(units: Sequence[str]) -> str:
+    """Those of labels of an axis as one text: "m" where they are alike, "m, rad" where they are not."""
+    return units[0] if len(set(units)) == 1 else SEPARATOR.join(units)
+
+
+def unit_of_label(units: str, number: int) -> str:
+    """That of one label of the text that `listed_units` has made."""
+    return units.split(SEPARATOR)[number] if SEPARATOR in units else units
 
 
 # ---- units as people write them -----------------------------------------------------------------------------------

@@ -33,6 +33,7 @@ from ffr_dyn.scene.described import described
 from ffr_dyn.scene.scene import Scene, require_scene
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
+from ffr_prep.common.units import listed_units, pretty, unit_of_label
 
 About = Literal["start", "equilibrium"]
 STEPS, ROWS = 400, 80  # of a period
@@ -229,12 +230,12 @@ def _as_result(
     spectrum = np.fft.fft(motions, axis=1)[:, 1 : harmonics + 1] * 2 / rows
     spectrum = spectrum * np.exp(-2j * np.pi * np.arange(1, harmonics + 1) / rows)[:, None]
     of, orders = Axis("of", tuple(name.replace(".", " ") for name in names)), Axis("order", _numbers(harmonics))
-    first = np.degrees(np.unwrap(np.angle(1j * spectrum[:, 0]), axis=0))
+    first, unit = np.degrees(np.unwrap(np.angle(1j * spectrum[:, 0]), axis=0)), listed_units(said["output_units"])
     quantities = {
         "frequency": Quantity(frequency, "Hz", (), "of the input"),
-        "amplitude": Quantity(0.5 * np.ptp(motions, axis=1), "1", (of,), "half of what the output covers"),
-        "mean": Quantity(motions.mean(axis=1), "1", (of,), "of the output over a period"),
-        "harmonics": Quantity(np.abs(spectrum).transpose(0, 2, 1), "1", (of, orders), "amplitudes of multiples"),
+        "amplitude": Quantity(0.5 * np.ptp(motions, axis=1), unit, (of,), "half of what the output covers"),
+        "mean": Quantity(motions.mean(axis=1), unit, (of,), "of the output over a period"),
+        "harmonics": Quantity(np.abs(spectrum).transpose(0, 2, 1), unit, (of, orders), "amplitudes of multiples"),
         "phase": Quantity(first, "deg", (of,), "of the first harmonic, against the input"),
         "growth": Quantity(growth, "1", (), "largest of Floquet's multipliers"),
         "stable": Quantity((growth <= 1 + GROWS).astype(float), "1", (), "1 where small deviations do not grow"),
@@ -291,7 +292,8 @@ def forced_lines(result: Result) -> list[str]:
         top = int(np.argmax(amplitude))
         shares = result["harmonics"][top, k] / max(float(amplitude[top]), 1e-300)
         higher = ", ".join(f"{100 * share:.3g} %" for share in shares[1:])
-        lines.append(f"output       {name}: at most {amplitude[top]:.6g} at {f[top]:.6g} Hz; higher harmonics {higher}")
+        most = f"{amplitude[top]:.6g} {pretty(unit_of_label(result.quantity('amplitude').unit, k))}".rstrip()
+        lines.append(f"output       {name}: at most {most} at {f[top]:.6g} Hz; higher harmonics {higher}")
     lines += [f"jump         at {one:.6g} Hz" for one in a["jumps"]]
     lines += [f"stability    changes at {one:.6g} Hz" for one in a["losses"]]
     return lines + [f"note         {note}" for note in a["notes"]]

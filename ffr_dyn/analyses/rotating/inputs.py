@@ -143,7 +143,11 @@ def _unit(of: Acting) -> str:
         return ("rad" if angle else "m") + ("", "/s", "/s^2")[of.order or 0]
     if isinstance(of.effort, str):
         return "m/s^2" if of.effort in BASE else "1"
-    turning = of.effort.coordinate == "angle" if isinstance(of.effort, JointEffort) else of.effort.moment
+    return _effort_unit(of.effort)
+
+
+def _effort_unit(of: Effort) -> str:
+    turning = of.coordinate == "angle" if isinstance(of, JointEffort) else of.moment
     return "N m" if turning else "N"
 
 
@@ -167,10 +171,11 @@ def absolute_order(effort: str | Effort, name: str) -> int | None:
 
 
 def told(of: Acting, given: str | Effort, units: Mapping[str, str], outputs: Sequence[str]) -> dict[str, Any]:
-    """Attributes of a result: the input in words, its unit, and those of outputs, of which most are known."""
-    own = _unit(of)
+    """Attributes of a result: the input in words, its unit, and those of outputs; the effort of a driver whose place is taken
+    is known here."""
+    own = "" if isinstance(of.effort, str) else _effort_unit(of.effort)
     found = [own if name == of.own else units[name] for name in outputs]
-    return {"input": _in_words(of, given), "input_unit": own, "output_units": found}
+    return {"input": _in_words(of, given), "input_unit": _unit(of), "output_units": found}
 
 
 def _in_words(of: Acting, given: str | Effort) -> str:

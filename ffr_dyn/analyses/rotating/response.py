@@ -28,6 +28,7 @@ from ffr_dyn.scene.described import described
 from ffr_dyn.scene.scene import Scene, require_scene
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.errors import InputError
+from ffr_prep.common.units import listed_units, pretty, quotient, square, unit_of_label
 
 About = Literal["start", "equilibrium", "steady"]
 PARTS = 12
@@ -284,23 +285,25 @@ def _as_result(
     outputs = Axis("of", tuple(name.replace(".", " ") for name in linear.outputs))
     names = _mode_names(linear, found)
     parts = Axis("part", ("re", "im"))
-    H = found.H
+    H, own = found.H, said["output_units"]
+    unit = listed_units([quotient(one, said["input_unit"]) for one in own])
     quantities = {
         "frequency": Quantity(found.frequencies, "Hz", (), "of the input"),
-        "gain": Quantity(np.abs(H), "1", (outputs,), "output over input"),
+        "gain": Quantity(np.abs(H), unit, (outputs,), "output over input"),
         "phase": Quantity(np.degrees(np.unwrap(np.angle(H), axis=0)), "deg", (outputs,), "of the output"),
-        "transfer": Quantity(np.stack([H.real, H.imag], axis=2), "1", (outputs, parts), "transfer function"),
+        "transfer": Quantity(np.stack([H.real, H.imag], axis=2), unit, (outputs, parts), "transfer function"),
     }
     if names:
         modes = Axis("part_of", tuple(f"{k + 1}" for k in range(len(names))))
         split = np.stack([found.parts.real, found.parts.imag], axis=3)
-        quantities["parts"] = Quantity(split, "1", (outputs, modes, parts), "transfer functions of single modes")
+        quantities["parts"] = Quantity(split, unit, (outputs, modes, parts), "transfer functions of single modes")
     more: dict[str, Any] = {}
     if psd.size:
         f, s = psd.T
         level = np.interp(found.frequencies, f, s, left=0.0, right=0.0)[:, None]
         density = np.multiply(np.abs(H) ** 2, level, out=np.zeros(H.shape), where=level > 0)
-        quantities["density"] = Quantity(density, "1/Hz", (outputs,), "one-sided, of the output squared")
+        squared = listed_units([quotient(square(one), "Hz") for one in own])
+        quantities["density"] = Quantity(density, squared, (outputs,), "one-sided, of the output squared")
         more["rms"] = dict(zip(linear.outputs, np.sqrt(power).tolist(), strict=True))
     attributes = {
         **described(scene),
@@ -329,11 +332,13 @@ def response_lines(result: Result) -> list[str]:
     parts = result["parts"] @ np.array([1, 1j]) if len(a["modes"]) else np.zeros((f.size, gain.shape[1], 0))
     for k, name in enumerate(a["outputs"]):
         top = int(np.argmax(gain[:, k]))
-        where = f"gain {gain[0, k]:.5g} at {f[0]:.4g} Hz, at most {gain[top, k]:.5g} at {f[top]:.5g} Hz"
+        unit = f" {pretty(unit_of_label(result.quantity('gain').unit, k))}".rstrip()
+        where = f"gain {gain[0, k]:.5g}{unit} at {f[0]:.4g} Hz, at most {gain[top, k]:.5g}{unit} at {f[top]:.5g} Hz"
         lines.append(f"output       {name}: {where}")
         size = np.abs(parts[top, k])
         shares = size / min(gain[top, k], size.max(initial=0.0)) if gain[top, k] else 0.0 * size
         most = [m for m in np.argsort(-shares, kind="stable")[:3] if SHARE < shares[m] < 1 / SHARE]
         lines += [f"             {100 * shares[m]:5.1f} % there by {a['modes'][m]}" for m in most]
-    lines += [f"rms          {name}: {value:.6g}" for name, value in a.get("rms", {}).items()]
+    rms = zip(a.get("rms", {}).items(), a["output_units"], strict=False)
+    lines += [f"rms          {name}: {value:.6g} {pretty(unit)}".rstrip() for (name, value), unit in rms]
     return lines + [f"note         {note}" for note in a["notes"]]

@@ -17,6 +17,7 @@ from places import ROOT, TESTS
 from synthetic import cloud
 
 from ffr_dyn.analyses.checkpoint import Checkpoint, decode, encode
+from ffr_dyn.analyses.events import Event
 from ffr_dyn.analyses.integration import integrate
 from ffr_dyn.compile.first_use import ensure_compiled
 from ffr_dyn.functions.time_functions import harmonic
@@ -83,6 +84,38 @@ def test_a_stopped_run_goes_on_to_the_same_bits(tmp_path, whole, at):
     result = integrate(SCENE, **SETTINGS, resume=path)
     assert_same_bits(result, whole)
     assert_same_bits(load_result(path), whole)
+
+
+EVENTS = (
+    Event("once", "one.b.position.x", 0.0),
+    Event("turn", "hinge.angle", -6.5, direction="falling"),
+    Event("worked", "push.work", -1.0),
+    Event("function", lambda t, state: state.position("two.c")[1], 0.0),
+    Event("last", "hinge.angle", -9.0, stop=True),
+)
+
+
+@pytest.mark.parametrize("at", [0.0, 0.3, 0.6])
+def test_a_run_with_events_goes_on_to_the_same_bits(tmp_path, at):
+    """With those of its first part, the row that ends it, and the memory of angles and work; it was refused."""
+    path, settings = tmp_path / "run.nc", SETTINGS | {"events": EVENTS}
+    whole = integrate(SCENE, **settings, path=tmp_path / "whole.nc")
+    assert {event["event"] for event in whole.attributes["events"]} == {event.name for event in EVENTS}
+    assert whole.time[-1] < SETTINGS["end"]
+    with pytest.raises(StoppedError):
+        integrate(SCENE, **settings, path=path, progress=stop_after(at))
+    assert_same_bits(integrate(SCENE, **settings, resume=path), whole)
+    later = integrate(SCENE, **settings | {"end": 2.0}, resume=path)  # which an event has ended
+    assert later.time.tobytes() == whole.time.tobytes()
+    assert later.attributes["events"] == whole.attributes["events"]
+
+
+def test_a_run_with_other_events_is_another(tmp_path):
+    path, settings = tmp_path / "run.nc", SETTINGS | {"end": 0.02}
+    integrate(SCENE, **settings, events=EVENTS[:1], path=path)
+    for other in ((), EVENTS[:2], (replace(EVENTS[0], value=0.1),)):
+        with pytest.raises(InputError, match="another scene or of other settings"):
+            integrate(SCENE, **settings, events=other, resume=path)
 
 
 @pytest.mark.slow

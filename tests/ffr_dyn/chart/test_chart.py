@@ -776,6 +776,12 @@ def test_a_body_without_surface_has_no_shape():
         measures_of(bare, ["deflection:rod"])
 
 
+def test_the_name_of_a_scene_is_no_formula(small, tmp_path):
+    """matplotlib takes text between two "$" for one: a chart of such a scene ended in a traceback."""
+    priced = draw_chart(replace(small, title="5 $ _{ 6 $"), tmp_path / "c.svg").read_text(encoding="utf-8")
+    assert "5 $ _{ 6 $: work and precision" in priced
+
+
 def test_nothing_to_draw_is_said(diagram, tmp_path):
     empty = replace(diagram, points=(), lost=(Lost("rk4", "m", "the label", "step", 1.0, "the reason"),))
     with pytest.raises(InputError, match=r"no variant ran .the label: the reason"):

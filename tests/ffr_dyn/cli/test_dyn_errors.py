@@ -22,7 +22,8 @@ from ffr_dyn.consistency.mobility import mobility
 from ffr_dyn.functions.time_functions import polynomial, table
 from ffr_dyn.integrators import RK4, ROS2, GeneralisedAlpha, HalfExplicit
 from ffr_dyn.integrators.stabilisation import Drifting, Projection
-from ffr_dyn.results.file import load_result
+from ffr_dyn.results.file import load_result, save_result
+from ffr_dyn.results.result import Quantity, Result
 from ffr_dyn.scene.drivers import Driver
 from ffr_dyn.scene.forces import Actuator, Load
 from ffr_dyn.scene.joints import Joint
@@ -407,6 +408,30 @@ def test_flexible_scene_file_runs_from_the_command_line(monkeypatch, capsys, tmp
     two = run_cli(monkeypatch, capsys, "plot", tmp_path / "scene.nc", "bar.a", "bar.b", "--path", "xy", "-o", path)
     assert two[0] == 2
     assert "give one marker, not 2 names" in two[1]
+
+
+def test_what_info_says_of_events_and_of_no_rows(monkeypatch, capsys, tmp_path):
+    """An event a line, without the hundreds of numbers of its state; a run that was stopped before its first row."""
+    event = {
+        "event": "up",
+        "quantity": "a",
+        "time": 0.25,
+        "rising": True,
+        "rate": 1.0,
+        "x": [0.125] * 99,
+        "v": [0.125],
+        "error": 1e-9,
+    }
+    result = Result(
+        np.zeros(0), {"a": Quantity(np.zeros(0), "m")}, {}, {"events": [event], "gravity": [0.0, -9.81, 0.0]}
+    )
+    save_result(result, tmp_path / "a.nc")
+    code, said = run_cli(monkeypatch, capsys, "info", tmp_path / "a.nc")
+    assert code == 0, said
+    assert re.search(r"^events +up at t = 0\.25 s, within 1e-09 s, rising: a$", said, re.MULTILINE)
+    assert re.search(r"^gravity +0, -9\.81, 0$", said, re.MULTILINE)
+    assert re.search(r"^rows +0$", said, re.MULTILINE)
+    assert "0.125" not in said
 
 
 def test_module_runs_as_a_command():

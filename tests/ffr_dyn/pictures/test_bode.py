@@ -7,7 +7,10 @@ from dataclasses import replace
 import pytest
 
 import ffr_dyn as fd
+from ffr_dyn.analyses.rotating.forced import forced_lines
+from ffr_dyn.analyses.rotating.response import response_lines
 from ffr_dyn.pictures.bode import labelled
+from ffr_prep.common.units import pretty
 
 ROD = fd.rigid_body("rod", mass=1.0, inertia=(1e-3, 0.1, 0.1), points={"a": (-0.5, 0, 0), "b": (0.5, 0, 0)})
 SPRUNG = fd.Scene(
@@ -31,12 +34,44 @@ Y = "rod.b.acceleration.y"
         (SPRUNG, "push", ["hinge.angle"], "1", ["rad"]),
         (DRIVEN, "motor.angle_rate", ["rod.b.velocity.y"], "rad/s", ["m/s"]),
         (DRIVEN, "motor.moment", ["motor.effort"], "N m", ["N m"]),
+        (DRIVEN, "motor.angle", ["motor.effort", "rod.b.position.y"], "rad", ["N m", "m"]),
     ],
 )
 def test_a_response_knows_the_units_of_its_gains(scene, given, outputs, per, units):
     found = fd.response(scene, input=given, outputs=outputs, band_of=(0.5, 10.0))
     assert found.attributes["input_unit"] == per
     assert found.attributes["output_units"] == units
+
+
+@pytest.mark.parametrize(
+    ("outputs", "unit", "first", "squared"),
+    [
+        (["hinge.angle"], "rad/(N m)", "rad/(N m)", "rad^2/Hz"),
+        ([Y, "hinge.angle"], "m/s^2/(N m), rad/(N m)", "m/s^2/(N m)", "(m/s^2)^2/Hz"),
+    ],
+)
+def test_gains_have_the_units_of_output_over_input(tmp_path, outputs, unit, first, squared):
+    """In the quantity, in the file, and in the headings of tables: all of them said 1."""
+    found = fd.response(
+        SPRUNG, input="hinge.moment", outputs=outputs, band_of=(0.5, 10.0), psd=[(0.5, 1.0), (9.0, 1.0)]
+    )
+    name = outputs[0].replace(".", " ")
+    assert {found.quantity(one).unit for one in ("gain", "transfer", "parts")} == {unit}
+    assert found.quantity(f"density.{name}").unit == squared
+    again = fd.load_result(fd.save_result(found, tmp_path / "found.nc"))
+    assert again.quantity(f"transfer.{name}.re").unit == first
+    heading = fd.write_csv(again, tmp_path / "found.csv", ["gain"]).read_text().splitlines()[0]
+    assert heading.startswith(f"time [s],gain.{name} [{first}]")
+    assert any(f"gain {found['gain'][0, 0]:.5g} {pretty(first)} at" in line for line in response_lines(found))
+
+
+def test_amplitudes_have_the_units_of_their_outputs():
+    """Of forced vibrations they said 1."""
+    given = {"input": "hinge.moment", "amplitude": 1e-3, "band_of": (1.0, 3.0)}
+    found = fd.forced(SPRUNG, outputs=["rod.b.position.y", "hinge.angle"], **given)
+    assert [found.quantity(name).unit for name in ("amplitude", "mean", "harmonics")] == ["m, rad"] * 3
+    assert found.quantity("harmonics.hinge angle.2").unit == "rad"
+    assert any(" m at " in line for line in forced_lines(found))
 
 
 def test_curves_are_named_with_their_units(tmp_path):

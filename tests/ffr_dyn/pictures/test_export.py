@@ -137,6 +137,38 @@ def test_matlab_and_tables_hold_the_histories(tmp_path):
     np.testing.assert_array_equal(read, np.stack([result.time, result["rod.tip.position.y"]], axis=1))
 
 
+def named(*names):
+    """A result with a number of its own under each name."""
+    return fd.Result(np.zeros(1), {name: fd.Quantity(np.full(1, 1.0 + k), "m") for k, name in enumerate(names)})
+
+
+@pytest.mark.parametrize(
+    ("names", "place"),
+    [
+        (("rod-1.R", "rod_1.q"), "'rod_1'"),
+        (("rod-1.a.position", "rod_1"), "'rod_1'"),
+        (("x" * 70, "x" * 71), f"'{'x' * 63}'"),
+        (("2nd", "n2nd"), "'n2nd'"),
+        (("units.R",), "'units'"),
+    ],
+)
+def test_names_that_are_one_in_matlab_are_refused(tmp_path, names, place):
+    """MATLAB's names are letters, digits and "_" (documentation of MATLAB, "Variable names"): one of two was lost."""
+    with pytest.raises(InputError, match=f"would be {place} in MATLAB.*rename one in the scene"):
+        fd.export(named(*names), tmp_path / "a.mat")
+    assert not list(tmp_path.iterdir())
+
+
+def test_matlab_gets_every_value_under_a_name_that_it_takes(tmp_path):
+    """Keywords are no names (MATLAB's `iskeyword`); what has parts and a value keeps both, in whatever order."""
+    from scipy.io import loadmat
+
+    mat = loadmat(fd.export(named("end.R", "bar.q.x", "bar.q", "8.R"), tmp_path / "a.mat"), simplify_cells=True)
+    assert (mat["nend"]["R"], mat["bar"]["q"]["x"]) == (1.0, 2.0)
+    assert (mat["bar"]["q"]["values"], mat["n8"]["R"]) == (3.0, 4.0)
+    assert mat["units"]["bar"]["q"] == {"x": "m", "values": "m"}
+
+
 def test_xarray_and_pandas_hold_the_histories():
     pytest.importorskip("xarray"), pytest.importorskip("pandas")
     result = rotating_box()
@@ -174,6 +206,15 @@ def test_what_cannot_be_exported_is_named(tmp_path, name, names, message):
     with pytest.raises(InputError, match=message):
         fd.export(rotating_box(), tmp_path / name, names)
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("suffix", ["vtkhdf", "pvd", "glb"])
+def test_results_without_motion_are_answered_by_what_they_hold(tmp_path, suffix):
+    """A response was told to run its scene with other outputs, which it does not have."""
+    gain = fd.Quantity(np.ones(2), "m/N")
+    result = fd.Result(np.zeros(2), {"frequency": gain, "gain": gain}, {}, {"analysis": "frequency response"})
+    with pytest.raises(InputError, match=r"'frequency response' has no motion .*as \.csv or \.mat: frequency, gain"):
+        fd.export(result, tmp_path / f"a.{suffix}")
 
 
 def test_the_command_exports(tmp_path):

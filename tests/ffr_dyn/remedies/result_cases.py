@@ -23,6 +23,7 @@ from ffr_dyn.analyses.kinematic import kinematic
 from ffr_dyn.functions.time_functions import polynomial
 from ffr_dyn.integrators import ROS2
 from ffr_dyn.pictures.animate import animate
+from ffr_dyn.pictures.export import export
 from ffr_dyn.pictures.film import Camera, film
 from ffr_dyn.pictures.histories import plot, plot_path
 from ffr_dyn.pictures.stress_report import stress_report
@@ -234,6 +235,13 @@ def both() -> Result:
     return run(Scene((Body("one", MODEL), Body("two", MODEL))), end=0.02)
 
 
+def for_matlab(names: list[str] | None = None) -> None:
+    """What MATLAB takes for one name."""
+    two = dict.fromkeys(("rod-1.R", "rod_1.R"), Quantity(np.zeros(1), "m"))
+    with TemporaryDirectory() as folder:
+        export(Result(np.zeros(1), two), Path(folder) / "a.mat", names)
+
+
 POSITION = "cloud.b.position"
 PICTURES = [
     Case(p(pictured, plot, ()), p(pictured, plot, (POSITION,))),
@@ -265,6 +273,8 @@ PICTURES = [
     Case(lambda: reported(result(), since=9.0), lambda: reported(result(), since=0.01)),
     told("stress run.nc --point 1,2 -o out", f"stress run.nc --point {','.join(map(str, CORNER))} -o out"),
     told("animate run.nc --scale big -o film.html", "animate run.nc --scale 2 -o film.html"),
+    Case(p(for_matlab), p(for_matlab, ["rod-1.R"])),
+    Case(p(shown, lambda: ROWS), p(pictured, plot, POSITION)),
 ]
 DEADLINES = [
     Case(p(measure_steps, HINGED, ROS2(1e-3), duration=0.0), p(measure_steps, HINGED, ROS2(1e-3), duration=0.01)),

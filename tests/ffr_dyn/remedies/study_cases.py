@@ -146,6 +146,7 @@ CASES = [
     Case(asked({"gravity": [1], "gravity.2": [1]}), asked({"gravity.2": [1]})),
     Case(made({"stripe": LINE}), made({"strip": LINE})),
     Case(made({"strip": f"modes {LINE}"}), made({"strip": LINE})),
+    Case(made({"strip": "reduce d.geo --set d='${d}deg'"}), made({"strip": "reduce d.geo --set d='${d}mm'"})),
     Case(asked(G, {"angle": "hinge.angle"}), asked(G)),
     Case(asked(G, {"time": "hinge.angle: last"}), asked(G)),
     Case(p(swept, {"x": "hinge.force: history"}), p(swept, {"x": "hinge.force.x: history"})),

@@ -352,6 +352,9 @@ MOTOR = '[drivers.m]\njoint = "hinge"\nfunction = '
     ("old", "new", "words"),
     [
         ("gravity =", "gravty =", ["'gravty' is not a known entry", "did you mean 'gravity'"]),
+        ("end = 0.1", 'end = 0.1\noutputs = ["*"]', ["analysis", "'outputs' is", "at the top of the file, before the first"]),
+        ("end = 0.1", "end = 0.1\nparameters = {a = 1}", ["'parameters' is", "a table of its own, [parameters]"]),
+        ("gravity =", "output_step = 1\ngravity =", ["'output_step' is", "belongs in the table [analysis]"]),
         ("stiffness =", "stifness =", ["springs.rope", "'stifness' is not a known entry", "did you mean 'stiffness'"]),
         ("end = 0.1", "ende = 0.1", ["analysis", "'ende'", "did you mean 'end'"]),
         ('"5 N/mm"', '"5 N/mmm"', ["springs.rope.stiffness", "unknown unit 'mmm'", "did you mean 'mm'"]),

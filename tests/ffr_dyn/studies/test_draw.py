@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.tri import LinearTriInterpolator
 
 from ffr_dyn.pictures import histories
-from ffr_dyn.studies.draw import likely_errors, plot_study, running_mean, tornado
+from ffr_dyn.studies.draw import likely_errors, plot_study, running_mean, tornado, triangulated
 from ffr_dyn.studies.table import Table
 
 X = np.linspace(0.0, 1.0, 6)
@@ -66,6 +67,45 @@ def test_rows_without_a_time_are_drawn_over_their_numbers(drawn):
     assert axes.get_xlabel() == "row"
     assert len(axes.collections[0].get_segments()) == 6
     assert axes.get_xlim()[1] > 3.9
+
+
+@pytest.mark.parametrize("scale", [1.0, 1e11, 1e-9])
+def test_a_surface_is_as_near_whatever_the_units_of_its_parameters(scale):
+    """Between points it is linear: of 2 a + b its values are those of the function, in any units. Of 1 / (E d^4) with E in Pa
+    and d in m the error was five times as large, as neighbours were those in E alone."""
+    random = np.random.default_rng(0)
+    a, b = random.uniform(1.9, 2.1, 60), random.uniform(5e-3, 7e-3, 60)
+    inner = np.column_stack([random.uniform(1.93, 2.07, 400), random.uniform(5.3e-3, 6.7e-3, 400)])
+    law = lambda a, b: (6e-3 / b) ** 4 * 2.0 / a  # noqa: E731
+    surface = LinearTriInterpolator(triangulated(np.column_stack([scale * a, b])), law(a, b))
+    off = surface(scale * inner[:, 0], inner[:, 1]) - law(*inner.T)
+    assert np.abs(off).mean() < 0.012
+
+
+@pytest.mark.parametrize(
+    ("a", "y"),
+    [
+        (1e17 * (1 + X), 1e17 + X),
+        (1e17 + 16 * np.arange(6), 1e17 + 16 * np.arange(6)),
+        (5 + 1e-9 * X, 1e-9 * X),
+        (X, 1e-6 * X + 1e12 * (X == 1)),
+    ],
+)
+def test_values_of_any_size_are_drawn(drawn, a, y):
+    """Qhull and the bins of histograms fail where ranges are rounding beside values, or one value is far from the others."""
+    found = drawn({"a": a, "b": X**2}, {"y": y})
+    assert {"y.png", "y-mean.png", "y-tornado.png", "pairs.png"} <= found.keys()
+
+
+def test_names_are_no_formulas_of_matplotlib(drawn):
+    axes = drawn({"a$^{": X}, {"$ _{ $": X})["$ _{ $.png"][0]
+    assert not is_math_text(axes.get_xlabel())
+    assert not is_math_text(axes.figure.get_supylabel())
+
+
+def is_math_text(text):
+    """Whether matplotlib may take a text for a formula (`matplotlib.cbook`): it has a "$" without a backslash."""
+    return text.count("$") > text.count(r"\$")
 
 
 @pytest.mark.parametrize("count", [2, 3, 5, 20])

@@ -15,7 +15,7 @@ from places import MESHES
 
 from ffr_prep import cli
 from ffr_prep.body import damped, load_body, rigid_body, save_body
-from ffr_prep.cli.options import interface_of, reference_of
+from ffr_prep.cli.options import interface_of, numbers_of, reference_of
 from ffr_prep.cli.terminal import Step, Steps
 from ffr_prep.common.errors import ComputationError, InputError
 from ffr_prep.mesh.mesh import Block
@@ -277,6 +277,21 @@ def one_node(folder):
 
 def bar(folder):
     return BAR[0]
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "value"),
+    [
+        ("L=0.5", "mm", 0.5),
+        ("L=0.5 m", "mm", 500.0),
+        ("L=30cm", None, 0.3),
+        ("L=0.3m", "mm", 300.0),
+        ("L=2 in", "in", 2.0),
+    ],
+)
+def test_lengths_with_a_unit_come_in_that_of_the_script(text, unit, value):
+    """As studies give ranges with units to the lines that make bodies, each of which failed: '0.4m' is not a number."""
+    assert numbers_of([text], unit) == {"L": value}
 
 
 FAILURES = {

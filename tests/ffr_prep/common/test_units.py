@@ -8,7 +8,7 @@ import pytest
 
 from ffr_prep.common import units
 from ffr_prep.common.errors import InputError
-from ffr_prep.common.units import to_si
+from ffr_prep.common.units import listed_units, quotient, square, to_si, unit_of_label
 
 # The International System of Units (BIPM, 9th edition 2019): base and derived units, tables 2 to 4; min, h, deg: table 8;
 # bar: 10^5 Pa exactly (8th edition, table 8); inch: 25.4 mm exactly (agreement of 1959); rpm: a turn of 2 pi rad in 60 s.
@@ -72,3 +72,17 @@ def test_a_prefix_multiplies_by_a_power_of_ten(prefix, unit):
 )
 def test_products_powers_and_quotients(unit, size):
     assert to_si(1.0, unit) == pytest.approx(size, rel=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("unit", "by", "found"),
+    [("m", "N", "m/N"), ("m", "N m", "m/(N m)"), ("m", "1", "m"), ("1", "N", "1/N"), ("m/s^2", "m/s^2", "1")],
+)
+def test_units_of_quotients(unit, by, found):
+    assert quotient(unit, by) == found
+
+
+def test_units_of_labels_are_told_once_where_they_are_alike():
+    assert listed_units(["m", "m"]) == "m"
+    assert [unit_of_label(listed_units(["m", "N m", "1"]), k) for k in range(3)] == ["m", "N m", "1"]
+    assert [square(unit) for unit in ("m", "m/s", "1")] == ["m^2", "(m/s)^2", "1"]

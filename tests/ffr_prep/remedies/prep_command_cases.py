@@ -40,6 +40,7 @@ OPTIONS = [
     reduces("--set a --mesher-timeout 9", "--mesher-timeout 9"),
     words("mesh part.geo --set w", "mesh part.geo --size 1 --order 1 --set w=0.2"),
     words("mesh part.geo --set w=wide", "mesh part.geo --size 1 --order 1 --set w=2e-1"),
+    words("mesh part.geo --set w=3deg", "mesh part.geo --size 1 --order 1 --set w=20cm"),
     reduces("--material steel --material ALL=brass", "--material ALL=steel"),
     reduces("--material ALL=steel --material ALL=brass", "--material ALL=brass"),
     reduces("--interface =x", "--interface RIGHT"),
