@@ -18,7 +18,7 @@ from ffr_dyn.equations.inertia import mass_matrix
 from ffr_dyn.equations.layout import initial_state, layout
 from ffr_dyn.scene.drivers import Driver
 from ffr_dyn.scene.scene import Body, Scene, joints_of
-from ffr_prep.body import CONVERTED_FROM, TRUNCATION_ERROR, FlexibleBody, Interface, errors_of_modes
+from ffr_prep.body import CONVERTED_FROM, MESH_ERROR, TRUNCATION_ERROR, FlexibleBody, Interface, errors_of_modes
 from ffr_prep.common.arrays import Array
 from ffr_prep.common.in_words import settings_in_words
 
@@ -26,6 +26,8 @@ HELD = "held_body"  # of the provenance
 APART = 0.03  # relative difference of frequencies, beyond which it is told
 STILL = 1e-6  # of a squared frequency, relative to the lowest of the body, below which a motion is rigid
 MOST = 3  # bodies that are named
+CAUSES = {MESH_ERROR: "by its mesh", TRUNCATION_ERROR: "for want of shapes"}
+REMEDIES = {MESH_ERROR: "take smaller elements", TRUNCATION_ERROR: "keep more modes"}
 AXES = "xyz"
 
 
@@ -54,23 +56,31 @@ def held_frequencies(scene: Scene, poses: Iterable[tuple[Array, Array]], plane: 
 
 
 def beyond_modes(scene: Scene, highest: float) -> list[str]:
-    """A note on bodies whose vibrations are too fast by more than APART somewhere up to a frequency [Hz], as their reduction
-    has left out shapes that they need."""
-    found = []
-    for body in scene.bodies:
-        known = errors_of_modes(body.model.provenance, TRUNCATION_ERROR)
-        wrong = [(k, error) for k, error in known.items() if error > APART]
-        for k, error in [] if CONVERTED_FROM in body.model.provenance else wrong[:1]:
-            has = float(body.model.frequencies[k - 1])
-            found += [(has / (1 + error), f"mode {k} of {body.name!r}, of {has:.4g} Hz, by {100 * error:.2g} %")]
-    found = sorted((one for one in found if one[0] <= highest), key=lambda one: one[0])
+    """A note on bodies whose vibrations are too fast by more than APART somewhere up to a frequency [Hz], by the shapes that
+    their reduction has left out or by the size of their elements."""
+    found = sorted(one for body in scene.bodies if body.model.n for one in _too_fast(body) if one[0] <= highest)
     if not found:
         return []
     more = f", and modes of {len(found) - MOST} other bodies" if len(found) > MOST else ""
+    remedies = " and ".join(dict.fromkeys(REMEDIES[cause] for _, cause, _ in found))
     return [
-        f"from about {found[0][0]:.4g} Hz on vibrations are too fast, for want of shapes: under their reference conditions "
-        f"{', '.join(text for _, text in found[:MOST])}{more}; keep more modes"
+        f"from about {found[0][0]:.4g} Hz on vibrations are too fast: under their reference conditions "
+        f"{', '.join(text for *_, text in found[:MOST])}{more}; {remedies}"
     ]
+
+
+def _too_fast(body: Body) -> list[tuple[float, str, str]]:
+    """Of the first mode that is known to be: the frequency that it should have [Hz], what it is by, and both in words."""
+    provenance = body.model.provenance
+    of_mesh, of_shapes = (errors_of_modes(provenance, kind) for kind in (MESH_ERROR, TRUNCATION_ERROR))
+    for k in sorted({*of_mesh, *of_shapes}) if CONVERTED_FROM not in provenance else ():
+        mesh, shapes = of_mesh.get(k, 0.0), of_shapes.get(k, 0.0)
+        error, has = (1 + mesh) * (1 + shapes) - 1, float(body.model.frequencies[k - 1])
+        if error > APART:
+            cause = MESH_ERROR if mesh > shapes else TRUNCATION_ERROR
+            words = f"mode {k} of {body.name!r}, of {has:.4g} Hz, by {100 * error:.2g} % {CAUSES[cause]}"
+            return [(has / (1 + error), cause, words)]
+    return []
 
 
 def in_a_band(scene: Scene, highest: float) -> list[str]:

@@ -18,6 +18,7 @@ TOLD = 0.02  # of the lowest frequency, from where on it is told unasked
 _FINER = {  # by what the record of the model has
     "mesh": "reduce it with smaller elements or with those of second order (`ffr-prep reduce --size`, `--order 2`; a file "
     "that is a mesh already is made finer by the program that wrote it)",
+    "members": "give its members more elements (`elements`)",
     "shells": "give its sheets more elements across their width, or quadrilaterals in place of triangles, which are much "
     "stiffer in their plane",
 }
@@ -51,14 +52,21 @@ def mesh_doubt(provenance: Mapping[str, Any]) -> str | None:
 
 def in_fewer_shapes(provenance: Mapping[str, Any], old: Array, new: Array) -> Mapping[str, Any]:
     """The provenance of a body in fewer combinations of its shapes: what its frequencies are too high by for want of shapes,
-    by those that it had and those that it has; without, where they are in no order. old (n,), new (m,) : omega^2 [1/s^2]."""
-    known = {k: e for k, e in errors_of_modes(provenance, TRUNCATION_ERROR).items() if k <= len(new)}
-    if not known or CONVERTED_FROM in provenance:
+    by those that it had and those that it has; without, where they are in no order. old (n,), new (m,) : omega^2 [1/s^2].
+
+    What they are too high by its mesh stays, of as many modes as it has.
+    """
+    if CONVERTED_FROM in provenance:
         return provenance
-    if (np.diff(old) < 0).any() or (np.diff(new) < 0).any():
-        return {key: of for key, of in provenance.items() if key != TRUNCATION_ERROR}
-    too_high = [float((new[k - 1] / old[k - 1]) ** 0.5 * (1.0 + error) - 1.0) for k, error in known.items()]
-    return {**provenance, TRUNCATION_ERROR: {"modes": list(known), "too_high": too_high}}
+    in_order = not ((np.diff(old) < 0).any() or (np.diff(new) < 0).any())
+    mesh, shapes = (
+        {k: e for k, e in errors_of_modes(provenance, kind).items() if k <= len(new) and in_order}
+        for kind in (MESH_ERROR, TRUNCATION_ERROR)
+    )
+    shapes = {k: float((new[k - 1] / old[k - 1]) ** 0.5 * (1.0 + error) - 1.0) for k, error in shapes.items()}
+    others = {key: of for key, of in provenance.items() if key not in (MESH_ERROR, TRUNCATION_ERROR)}
+    known = {kind: of for kind, of in ((MESH_ERROR, mesh), (TRUNCATION_ERROR, shapes)) if kind in provenance}
+    return others | {kind: {"modes": list(of), "too_high": list(of.values())} for kind, of in known.items()}
 
 
 def modes_doubt(provenance: Mapping[str, Any]) -> str | None:

@@ -18,6 +18,7 @@ import scipy.sparse as sp
 from ffr_prep.body import Surface
 from ffr_prep.common.arrays import Array
 from ffr_prep.structures import beams, plates
+from ffr_prep.structures.beam_mesh_error import inertia_energy
 from ffr_prep.structures.beam_second_order import second_stressed_sweep, second_sweep
 from ffr_prep.structures.beam_stiffening import beam_forces_of_products, beam_stiffening
 from ffr_prep.structures.beam_stress import SECTION_STRESS, section_forces, stressed_sweep
@@ -51,6 +52,8 @@ class Family:
     forces_of_products : (E, 6k, m) its linear form in the static coordinates, of one (E, 6k, 1) and others (E, 6k, m)
     second     : what is drawn, with the displacements of pairs: of their coordinates (E, 6k, m), one and others
     second_stressed : the same with their stress, and section forces of beams
+    mesh_energy : (r,) twice the strain energy that their size adds to the coordinates (E, 6k, r) of vibrations of omega^2
+                  (r,); None where all families are looked at together (`ffr_prep.structures.plate_mesh_error`)
     """
 
     name: str
@@ -66,6 +69,7 @@ class Family:
     forces_of_products: Callable[[Array, Array], Array]
     second: Callable[[Array, Array, Array], Surface]
     second_stressed: Callable[[Array, Array, Array], Surface]
+    mesh_energy: Callable[[Array, Array], Array] | None = None
 
 
 def families(frame: Frame) -> tuple[Family, ...]:
@@ -101,6 +105,7 @@ def beam_family(frame: Frame) -> Family:
         forces_of_products=partial(beam_forces_of_products, elements),
         second=partial(second_sweep, frame, elements),
         second_stressed=partial(second_stressed_sweep, frame, elements),
+        mesh_energy=partial(inertia_energy, elements),
     )
 
 

@@ -116,9 +116,25 @@ def from_frame(frame: Frame, interfaces: Sequence[InterfaceRegion] = (), *, prog
         second=second,
         recovery="; ".join(dict.fromkeys(part.recovery for part in parts)),
         record=_record(frame, interfaces, coupled, parts),
-        mesh_energy=lambda basis: added_energy(frame, loaded_nodes(frame, interfaces), ties @ basis),
+        mesh_energy=partial(_mesh_energy, parts, ties, coupled, frame, interfaces),
         cut=lambda cuts: [partial(from_frame, *part) for part in cut_frame(frame, interfaces, cuts)],
     )
+
+
+def _mesh_energy(
+    parts: Sequence[Family],
+    ties: sp.csr_array,
+    coupled: CoupledModel,
+    frame: Frame,
+    interfaces: Sequence[InterfaceRegion],
+    basis: Array,
+) -> Array:
+    """(n,) twice the strain energy that the size of the elements adds to a basis (Z, n) of vibrations of unit mass."""
+    omega2, q = np.einsum("zi,zi->i", basis, coupled.K @ basis), ties @ basis
+    of_families = [part.mesh_energy(element_values(part, q), omega2) for part in parts if part.mesh_energy]
+    of_plates = added_energy(frame, loaded_nodes(frame, interfaces), q)
+    total: Array = np.sum([*of_families, *([] if of_plates is None else [of_plates])], axis=0)
+    return total
 
 
 def _check_size(frame: Frame) -> None:

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from boxes import KINDS, STEEL, box_mesh, moved, rotation
+from matrix_models import of_frame
 from test_structural import straight
 
 import ffr_prep as fp
@@ -139,9 +140,9 @@ def test_tied_solids_add_their_energies():
     assert told(body)[0] == pytest.approx(0.6, rel=0.3)
 
 
-def test_beams_and_matrices_know_nothing_of_elements():
+def test_matrices_know_nothing_of_elements():
     request = fp.Request(name="b", reference=fp.MeanAxis(), reduction=fp.Eigenmodes(2))
-    body = fp.reduce(fp.from_frame(straight(rectangle(0.01, 0.02), 1.0, 4)), request)
+    body = fp.reduce(fp.from_matrices(of_frame(straight(rectangle(0.01, 0.02), 1.0, 4))), request)
     assert mesh_errors_of(body.provenance) == {}
     assert not any(line.startswith("mesh error") for line in body_lines(body))
 
