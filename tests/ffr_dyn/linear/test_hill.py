@@ -7,8 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.spatial.transform import Rotation
 
 import ffr_dyn as fd
+from ffr_dyn.analyses.rotating.steady import steady_states
 from ffr_dyn.linear.hill import Varying, hill, one_of_each
 from ffr_dyn.linear.matrices import CUT
 
@@ -196,3 +198,50 @@ def test_a_free_rotor_under_weight_is_as_one_that_is_driven_evenly_beside_a_vibr
     seen = np.abs(found.seen) * 2 * np.pi
     for exact in (100.0, 120.0):
         assert np.abs(seen - exact).min() < 1e-6 * exact
+
+
+def coupled(A: np.ndarray) -> fd.Scene:
+    """A rotor in unlike bearings that a damped coupling turns, under its weight, with its axis along A z."""
+    points, spin = {"l": A @ [0, 0, -0.2], "r": A @ [0, 0, 0.3]}, tuple(A @ [0, 0, 250.0])
+
+    def block(shifts, turns=(0, 0, 0)):
+        return np.block([[A @ np.diag(shifts) @ A.T, np.zeros((3, 3))], [np.zeros((3, 3)), A @ np.diag(turns) @ A.T]])
+
+    inertia = A @ np.diag([0.5, 0.6, ALONG]) @ A.T
+    disc = fd.rigid_body("disc", mass=MASS, inertia=inertia, centre_of_mass=A @ [1e-4, 0, 0], points=points)
+    motor = fd.rigid_body("motor", mass=1.0, inertia=(1e-3,) * 3, points={"c": (0, 0, 0)})
+    forces = [
+        fd.Bushing(end, f"ground.{end}", f"disc.{end}", block((1e6, 1.6e6, 5e5)), block((300.0, 400.0, 300.0)))
+        for end in points
+    ]
+    forces.append(
+        fd.Bushing("coupling", "motor.c", "disc.l", block((0, 0, 0), (0, 0, 2e4)), block((0, 0, 0), (0, 0, 1.0)))
+    )
+    return fd.Scene(
+        (fd.Body("disc", disc, omega_bar=spin), fd.Body("motor", motor, position=points["l"], omega_bar=spin)),
+        (fd.Joint("shaft", "revolute", "ground.l", "motor.c", axis=A @ [0, 0, 1.0]),),
+        (fd.Driver("drive", "shaft", fd.polynomial(0.0, 250.0)),),
+        forces=tuple(forces),
+        ground=points,
+        gravity=A @ [0, -9.81, 0],
+    )
+
+
+def test_the_damping_of_ends_that_turn_alike_does_not_vary():
+    """Their rate is rounding, by steps of which it was differentiated."""
+    ((_, found),) = steady_states(coupled(Rotation.from_rotvec((0.5, -0.9, 0.3)).as_matrix()), ())
+    first, third = np.abs(found.about.over_turn[1, [1, 3]]).max(axis=(1, 2))
+    assert max(first, third) < 1e-6  # bearings vary by the second harmonic alone
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("turn", [(0.1, 0.0, 0.0), (0.5, -0.9, 0.3)])
+def test_modes_are_those_of_a_machine_however_it_is_placed(turn):
+    values = []
+    for A in (np.eye(3), Rotation.from_rotvec(turn).as_matrix()):
+        scene = coupled(A)
+        found = fd.linearise(fd.scene_at(scene, fd.steady(scene)))
+        vibrating = found.eigenvalues[found.eigenvalues.imag > 0]
+        values.append(vibrating[np.argsort(np.abs(vibrating))])
+    np.testing.assert_allclose(values[1], values[0], rtol=1e-7)
+    assert values[1][0] == pytest.approx(complex(-0.5 / ALONG, np.sqrt(2e4 / ALONG)), rel=1e-5)
