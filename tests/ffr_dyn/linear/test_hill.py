@@ -245,3 +245,69 @@ def test_modes_are_those_of_a_machine_however_it_is_placed(turn):
         values.append(vibrating[np.argsort(np.abs(vibrating))])
     np.testing.assert_allclose(values[1], values[0], rtol=1e-7)
     assert values[1][0] == pytest.approx(complex(-0.5 / ALONG, np.sqrt(2e4 / ALONG)), rel=1e-5)
+
+
+SPEEDS, INNER, OUTER = (200.0, -300.0), (10.0, 0.5, 0.9), (6.0, 0.3, 0.4)  # rad/s; kg, kg m^2 across and along
+STIFFNESS, BETWEEN, DAMPING = 1e6, 5e5, 50.0
+AT = {"a": (-0.3, None), "b": (0.2, None), "between": (0.1, -0.1), "d": (None, 0.25)}  # of bearings on inner and outer
+
+
+def coaxial() -> fd.Scene:
+    """Two rotors that turn against each other, with a bearing between them, the centre of the outer at z = 0.2."""
+    parts = [
+        fd.rigid_body(name, mass=m, inertia=(A, A, C), points={n: (0, 0, at[k]) for n, at in AT.items() if at[k]})
+        for k, (name, (m, A, C)) in enumerate((("inner", INNER), ("outer", OUTER)))
+    ]
+    ends = {"a": "inner.a", "b": "inner.b", "between": "outer.between", "d": "outer.d"}
+    forces = [
+        fd.Bushing(
+            name,
+            "inner.between" if name == "between" else f"ground.{name}",
+            end,
+            np.diag(
+                [BETWEEN if name == "between" else STIFFNESS] * 2
+                + [1e6 if name in ("a", "between") else 0.0]
+                + [0.0] * 3
+            ),
+            np.diag([DAMPING] * 2 + [0.0] * 4),
+        )
+        for name, end in ends.items()
+    ]
+    bodies = [
+        fd.Body(part.name, part, position=(0, 0, z), omega_bar=(0, 0, speed))
+        for part, z, speed in zip(parts, (0.0, 0.2), SPEEDS, strict=True)
+    ]
+    return fd.Scene(
+        tuple(bodies), forces=tuple(forces), ground={"a": (0, 0, -0.3), "b": (0, 0, 0.2), "d": (0, 0, 0.45)}
+    )
+
+
+def coaxial_at_rest() -> np.ndarray:
+    """Eigenvalues (16,) in axes that do not turn; the damper between the rotors turns with the inner one."""
+    M = np.diag([m for mass, across, _ in (INNER, OUTER) for m in (mass, mass, across, across)])
+    C, K, around = np.zeros((8, 8)), np.zeros((8, 8)), np.array([[0.0, -1.0], [1.0, 0.0]])
+    for first, along, speed in ((2, INNER[2], SPEEDS[0]), (6, OUTER[2], SPEEDS[1])):
+        C[first : first + 2, first : first + 2] = -along * speed * around
+    for name, (inner, outer) in AT.items():
+        on = [np.zeros((2, 4)) if z is None else np.array([[1, 0, 0, z], [0, 1, -z, 0]]) for z in (inner, outer)]
+        B = np.hstack([-on[0] if name == "between" else on[0], on[1]])
+        k, turning = (BETWEEN, SPEEDS[0]) if name == "between" else (STIFFNESS, 0.0)
+        C += DAMPING * B.T @ B
+        K += B.T @ (k * np.eye(2) - DAMPING * turning * around) @ B
+    return np.linalg.eigvals(
+        np.block([[np.zeros((8, 8)), np.eye(8)], [-np.linalg.solve(M, K), -np.linalg.solve(M, C)]])
+    )
+
+
+@pytest.mark.slow
+def test_rotors_that_turn_against_each_other_have_the_multipliers_of_axes_at_rest():
+    period = 2 * np.pi / 100.0
+    found = fd.periodic(coaxial(), period=period, floquet=True, check=False)
+    values = np.array([complex(*one) for one in found.attributes["multipliers"]])
+    for exact in np.exp(coaxial_at_rest() * period):
+        assert np.abs(values - exact).min() < 1e-6
+
+
+def test_modes_of_rotors_at_several_speeds_are_told_to_be_those_of_the_mean():
+    ((_, found),) = steady_states(coaxial(), ())
+    assert "`periodic` with floquet finds the motion itself and its modes" in found.notes[-1]
