@@ -422,7 +422,7 @@ def test_a_round_rotor_whose_loads_are_rounding_is_accurate():
         forces=tuple(forces),
         ground=ends,
     )
-    found = fd.periodic(scene, method=fd.ROS3(2 * np.pi / 100.0 / 400))
+    found = fd.periodic(scene, method=fd.ROS3(2 * np.pi / 100.0 / 2000))
     error, of_range = np.array(list(found.attributes["errors"].values())).T
     assert error.max() < 1e-6
     assert of_range.max() < 0.01
