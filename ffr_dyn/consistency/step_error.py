@@ -372,7 +372,7 @@ def least_ranges(run: Result) -> dict[str, float]:
         "force": LITTLE * turning / (sizes["position"] or np.inf),
     }
     floors = {kind: max(LITTLE * most, CONSTANT * sizes[kind], beside.get(kind, 0.0)) for kind, most in largest.items()}
-    for kind, floor in _floors_at_rest(run, sizes).items():
+    for kind, floor in (*_floors_at_rest(run, sizes).items(), *_floors_of_turning(run).items()):
         floors[kind] = max(floors.get(kind, 0.0), floor)
     rounding = _rounding(run, sizes)
     return {name: max(floors[_kind(name)], rounding(run.quantities[name].unit)) for name in spans}
@@ -435,6 +435,18 @@ def _floors_at_rest(run: Result, sizes: dict[str, float]) -> dict[str, float]:
     lasts = float(np.ptp(run.time)) if run.time.size else 0.0
     far, rate = sizes.get("position", 0.0), CONSTANT / lasts if lasts > 0 else 0.0
     return {"velocity": far * rate, "omega_bar": rate, "energy": CONSTANT * far * sizes.get("force", 0.0)}
+
+
+def _floors_of_turning(run: Result) -> dict[str, float]:
+    """Of rates of elastic coordinates, a share of what they are in axes that do not turn, where a deformation that keeps its
+    shape on a turning body, as of a blade by its centrifugal force, has its size times the angular velocity for a rate."""
+    lasts, largest = float(np.ptp(run.time)) if run.time.size else 0.0, 0.0
+    for name in run.quantities:
+        body, _, last = name.rpartition(".")
+        if last == "q_dot" and {f"{body}.q", f"{body}.omega_bar"} <= run.quantities.keys():
+            size, speed = (np.abs(filled(run[f"{body}.{of}"])).max(initial=0.0) for of in ("q", "omega_bar"))
+            largest = max(largest, float(size * speed * min(1.0, speed * lasts)))  # only as far as it has turned
+    return {"q_dot": LITTLE * largest}
 
 
 def _kind(name: str) -> str:

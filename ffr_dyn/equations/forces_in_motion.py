@@ -19,6 +19,8 @@ from ffr_dyn.equations.placed import Sums, pair
 from ffr_dyn.scene.forces.force import Force
 from ffr_prep.common.arrays import Array
 
+CANCELS = 1e-9  # of the velocities that a rate is made of: what is left of ends that turn alike is rounding
+
 
 def add_velocities(total: Sums, damping: Array, now: At, force: Force, screws: tuple[Array, Array]) -> None:
     """Add the part of the velocities of two markers in their screws (u (2, 3), w (2, 3)) to forces, their tangent, and the
@@ -32,6 +34,7 @@ def add_velocities(total: Sums, damping: Array, now: At, force: Force, screws: t
     g, S = np.array([jet.first for jet in jets]), np.array([jet.second for jet in jets])
     m = pair_motion(both[0].r, both[1].r, *screws)
     rate, by_motion = g @ m, S @ m
+    rate[np.abs(rate) <= CANCELS * (np.abs(g) @ np.abs(m))] = 0.0  # steps beside rounding would make differences of it
     for at, w in ((FIRST, screws[1][0]), (SECOND, screws[1][1])):
         shift, turn = slice(at, at + 3), slice(at + 3, at + 6)
         by_motion[:, shift] += np.cross(g[:, shift], w)

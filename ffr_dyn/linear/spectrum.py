@@ -137,7 +137,7 @@ def followed(before: Spectrum, now: Spectrum) -> Spectrum:
     parts = np.choose(chosen, [one.parts for one in variants])
     lost = ~parts.any(axis=(0, 1))
     if lost.any() and parts.shape == before.parts.shape:
-        parts[..., lost] = before.parts[..., lost]
+        parts = np.where(lost, before.parts, parts)
     found = replace(now.only(columns), values=values, parts=parts)
     found = replace(found, body=np.where(lost, before.body, found.body))
     still = (values.imag == 0) & (before.whirl > ONE_WAY)

@@ -510,11 +510,16 @@ def _beside_the_axis(machine: Machine, now: At) -> tuple[str, ...]:
 
 
 def _varies(varying: float, rate: float) -> str:
-    of_modes = "The modes take account of the change" if rate else "The modes are found for the mean, too"
+    of_modes = (
+        "The modes take account of the change; `periodic` finds the motion itself"
+        if rate
+        else "Bodies turn at several speeds: the modes are found for the mean, too, and are off by what couples them, as a "
+        "bearing between two rotors does; `periodic` with floquet finds the motion itself and its modes"
+    )
     return (
         "the stiffness of the supports or the forces change with the angle of the turning bodies, by up to "
         f"{varying:.1g} of their size. Bearings that are not isotropic, weight across the axis and loads of fixed direction "
-        f"do so. The steady motion is found for the mean over a turn. {of_modes}; `periodic` finds the motion itself"
+        f"do so. The steady motion is found for the mean over a turn. {of_modes}"
     )
 
 

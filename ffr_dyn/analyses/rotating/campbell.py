@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import pairwise
+from itertools import accumulate, pairwise
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -38,6 +38,7 @@ from ffr_prep.common.progress import no_count
 
 MODES = 10
 MET = 1e-8  # of the speed of a crossing, relative to the range
+STILL = 1e-6  # of the fastest turning: a vibration that is nowhere faster is a free motion, but for rounding
 LEAPS = 2e-3  # of the speed: what a frequency is off its order at a crossing that is none
 
 Row = tuple[float, Spectrum]
@@ -155,15 +156,20 @@ def campbell(
 
 
 def _spectra(at: AtSpeed, values: Sequence[float], modes: int, progress: Callable[[int, int], None]) -> list[Spectrum]:
-    """The vibrations at every speed, each in its place. InputError where there are none."""
-    spectra = list[Spectrum]()
+    """The vibrations at every speed, each in its place, followed from a speed that has the most: blades on hinges vibrate in
+    rotation alone, and are free at rest. InputError where there are none."""
+    found = list[Spectrum]()
     for k, speed in enumerate(values):
-        one = at(speed, (values[k - 1], spectra[-1]) if spectra else None)
-        spectra.append(followed(spectra[-1], one) if spectra else one)
-        progress(len(spectra), len(values) + min(modes, spectra[0].values.size))
-    if not spectra[0].values.size:
+        found.append(at(speed, (values[k - 1], found[-1]) if found else None))
+        progress(len(found), len(values) + min(modes, found[0].values.size))
+    start = int(np.argmax([one.values.size for one in found]))
+    after = list(accumulate(found[start:], followed))
+    before = list(accumulate(found[start::-1], followed))[:0:-1]
+    spectra = [*before, *after]
+    moving = np.any([np.abs(one.values) > STILL * one.found.machine.screws.fastest for one in spectra], axis=0)
+    if not moving.any():
         raise InputError("nothing vibrates: joints and the driver fix every motion, or what they leave is free")
-    return spectra
+    return [one.only(np.flatnonzero(moving)) for one in spectra]
 
 
 def _doubts(scene: Scene, turn: str, time: float, speed: float, one: Spectrum) -> list[str]:
@@ -174,9 +180,12 @@ def _doubts(scene: Scene, turn: str, time: float, speed: float, one: Spectrum) -
 
 
 def _told_by(spectra: Sequence[Spectrum]) -> Spectrum:
-    """That nearest to the middle where most ways of whirling are known: at rest there are none."""
+    """That nearest to the middle where most vibrate and most ways of whirling are known: at rest there are none."""
     order = sorted(range(len(spectra)), key=lambda k: abs(k - len(spectra) // 2))
-    return max((spectra[k] for k in order), key=lambda one: int(np.isfinite(one.whirl).sum()))
+    return max(
+        (spectra[k] for k in order),
+        key=lambda one: (np.count_nonzero(one.values), np.count_nonzero(~np.isnan(one.whirl))),
+    )
 
 
 def _whirling(spectra: Sequence[Spectrum]) -> Array:

@@ -128,10 +128,11 @@ def periodic(
     selected(assembled.system, needed(scene, outputs))
     of, found = _found(assembled, time, method, period)
     record = _record(assembled, of, found)
-    result = result_of(assembled.system, record, {}, None, outputs)
+    says = described(scene)  # mass and length, too, by which errors tell what is small
+    result = result_of(assembled.system, record, says, None, outputs)
     told = _errors(assembled, (of, found), result, outputs, floquet) if check else {}
     attributes = {
-        **described(scene),
+        **says,
         "analysis": "periodic motion",
         "method": f"{'Newton' if found.newton else 'Anderson'}'s method on turns of {type(of.method).__name__}, step "
         f"{of.method.step:.6g} s, {found.periods:.3g} periods",

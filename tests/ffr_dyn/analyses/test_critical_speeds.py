@@ -326,3 +326,37 @@ def test_a_rotor_level_with_its_axis_turns_under_its_weight(off):
     exact = off * 50.0**2 / abs(2e4 - 50.0**2 + 150j)
     assert np.hypot(*found["disc.R"][0, :2]) == pytest.approx(exact, rel=1e-5)
     assert any("mean over a turn" in note for note in found.attributes["notes"])
+
+
+@pytest.mark.parametrize("spring", [0.0, 5e3])
+@pytest.mark.parametrize("speeds", [(0.0, 15.0, 30.0), (-30.0, 0.0, 30.0)])
+def test_blades_on_hinges_vibrate_though_they_are_free_at_rest(spring, speeds):
+    """Of a uniform blade with hinges at the distance e, of the length l beyond, w_flap^2 = W^2 (1 + 3 e / (2 l)) and
+    w_lag^2 = k / J + W^2 3 e / (2 l). (Johnson, Helicopter Theory, 1994, sections 5-1 and 5-18.)"""
+    e, length, mass = 0.3, 4.7, 40.0
+    J, speed = mass * length**2 / 3, speeds[-1]
+    blade = fd.rigid_body(
+        "blade",
+        mass=mass,
+        inertia=(1e-6, mass * length**2 / 12, mass * length**2 / 12),
+        centre_of_mass=(length / 2, 0, 0),
+        points={"h": (0, 0, 0)},
+    )
+    hub = fd.rigid_body("hub", mass=10.0, inertia=(1, 1, 1), points={"o": (0, 0, 0), "h": (e, 0, 0)})
+    link = fd.rigid_body("link", mass=1e-3, inertia=(1e-6,) * 3, points={"h": (0, 0, 0)})
+    out = {"position": (e, 0, 0), "velocity": (0, speed * e, 0), "omega_bar": (0, 0, speed)}
+    scene = fd.Scene(
+        (fd.Body("hub", hub, omega_bar=(0, 0, speed)), fd.Body("link", link, **out), fd.Body("blade", blade, **out)),
+        (
+            fd.Joint("mast", "revolute", "ground.o", "hub.o", axis=(0, 0, 1)),
+            fd.Joint("lag", "revolute", "hub.h", "link.h", axis=(0, 0, 1)),
+            fd.Joint("flap", "revolute", "link.h", "blade.h", axis=(0, -1, 0)),
+        ),
+        (fd.Driver("motor", "mast", fd.polynomial(0.0, speed)),),
+        forces=(fd.JointSpring("damper", "lag", stiffness=spring),) if spring else (),
+        ground={"o": (0, 0, 0)},
+    )
+    found, W = fd.campbell(scene, speeds=speeds), np.abs(speeds)
+    rates = dict(zip(found.attributes["names"], 2 * np.pi * found["frequencies"].T, strict=True))
+    np.testing.assert_allclose(rates["flap.angle"], W * np.sqrt(1 + 1.5 * e / length), rtol=1e-6)
+    np.testing.assert_allclose(rates["lag.angle"], np.sqrt(spring / J + W**2 * 1.5 * e / length), rtol=1e-6)

@@ -112,6 +112,16 @@ def test_outputs_that_hardly_move_are_measured_by_their_kind():
     assert scales["c.q"] == pytest.approx(1e-5)
 
 
+@pytest.mark.parametrize("still", [0.0, 1e-10])
+def test_rates_of_a_blade_that_keeps_its_shape_are_measured_as_in_axes_that_do_not_turn(still):
+    """There v = W x u of its deformation u, of which a thousandth counts as at rest, as of all that hardly moves."""
+    blade = {"q": 1e-5 + 0.0 * TIME, "q_dot": still * np.sin(40 * TIME), "omega_bar": 100.0 + 0.0 * TIME}
+    turning = Result(TIME, {f"blade.{of}": Quantity(values, "1") for of, values in blade.items()}, {}, {})
+    assert ranges(turning)["blade.q_dot"] == pytest.approx(1e-3 * 1e-5 * 100.0)
+    vibrating = replace(turning, quantities=turning.quantities | {"blade.q_dot": Quantity(1e-5 * TIME, "1")})
+    assert ranges(vibrating)["blade.q_dot"] == pytest.approx(1e-5)
+
+
 def test_forces_beside_torques_are_measured_by_the_torque_over_the_size():
     """A shaft under torque pulls at its ends by next to nothing, which no step is to resolve."""
     shaft = result(a_position=2.0 * TIME, a_moment=100.0 * TIME, a_force=1e-6 * TIME)

@@ -7,8 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.spatial.transform import Rotation
 
 import ffr_dyn as fd
+from ffr_dyn.analyses.rotating.steady import steady_states
 from ffr_dyn.linear.hill import Varying, hill, one_of_each
 from ffr_dyn.linear.matrices import CUT
 
@@ -196,3 +198,116 @@ def test_a_free_rotor_under_weight_is_as_one_that_is_driven_evenly_beside_a_vibr
     seen = np.abs(found.seen) * 2 * np.pi
     for exact in (100.0, 120.0):
         assert np.abs(seen - exact).min() < 1e-6 * exact
+
+
+def coupled(A: np.ndarray) -> fd.Scene:
+    """A rotor in unlike bearings that a damped coupling turns, under its weight, with its axis along A z."""
+    points, spin = {"l": A @ [0, 0, -0.2], "r": A @ [0, 0, 0.3]}, tuple(A @ [0, 0, 250.0])
+
+    def block(shifts, turns=(0, 0, 0)):
+        return np.block([[A @ np.diag(shifts) @ A.T, np.zeros((3, 3))], [np.zeros((3, 3)), A @ np.diag(turns) @ A.T]])
+
+    inertia = A @ np.diag([0.5, 0.6, ALONG]) @ A.T
+    disc = fd.rigid_body("disc", mass=MASS, inertia=inertia, centre_of_mass=A @ [1e-4, 0, 0], points=points)
+    motor = fd.rigid_body("motor", mass=1.0, inertia=(1e-3,) * 3, points={"c": (0, 0, 0)})
+    forces = [
+        fd.Bushing(end, f"ground.{end}", f"disc.{end}", block((1e6, 1.6e6, 5e5)), block((300.0, 400.0, 300.0)))
+        for end in points
+    ]
+    forces.append(
+        fd.Bushing("coupling", "motor.c", "disc.l", block((0, 0, 0), (0, 0, 2e4)), block((0, 0, 0), (0, 0, 1.0)))
+    )
+    return fd.Scene(
+        (fd.Body("disc", disc, omega_bar=spin), fd.Body("motor", motor, position=points["l"], omega_bar=spin)),
+        (fd.Joint("shaft", "revolute", "ground.l", "motor.c", axis=A @ [0, 0, 1.0]),),
+        (fd.Driver("drive", "shaft", fd.polynomial(0.0, 250.0)),),
+        forces=tuple(forces),
+        ground=points,
+        gravity=A @ [0, -9.81, 0],
+    )
+
+
+def test_the_damping_of_ends_that_turn_alike_does_not_vary():
+    """Their rate is rounding, by steps of which it was differentiated."""
+    ((_, found),) = steady_states(coupled(Rotation.from_rotvec((0.5, -0.9, 0.3)).as_matrix()), ())
+    first, third = np.abs(found.about.over_turn[1, [1, 3]]).max(axis=(1, 2))
+    assert max(first, third) < 1e-6  # bearings vary by the second harmonic alone
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("turn", [(0.1, 0.0, 0.0), (0.5, -0.9, 0.3)])
+def test_modes_are_those_of_a_machine_however_it_is_placed(turn):
+    values = []
+    for A in (np.eye(3), Rotation.from_rotvec(turn).as_matrix()):
+        scene = coupled(A)
+        found = fd.linearise(fd.scene_at(scene, fd.steady(scene)))
+        vibrating = found.eigenvalues[found.eigenvalues.imag > 0]
+        values.append(vibrating[np.argsort(np.abs(vibrating))])
+    np.testing.assert_allclose(values[1], values[0], rtol=1e-7)
+    assert values[1][0] == pytest.approx(complex(-0.5 / ALONG, np.sqrt(2e4 / ALONG)), rel=1e-5)
+
+
+SPEEDS, INNER, OUTER = (200.0, -300.0), (10.0, 0.5, 0.9), (6.0, 0.3, 0.4)  # rad/s; kg, kg m^2 across and along
+STIFFNESS, BETWEEN, DAMPING = 1e6, 5e5, 50.0
+AT = {"a": (-0.3, None), "b": (0.2, None), "between": (0.1, -0.1), "d": (None, 0.25)}  # of bearings on inner and outer
+
+
+def coaxial() -> fd.Scene:
+    """Two rotors that turn against each other, with a bearing between them, the centre of the outer at z = 0.2."""
+    parts = [
+        fd.rigid_body(name, mass=m, inertia=(A, A, C), points={n: (0, 0, at[k]) for n, at in AT.items() if at[k]})
+        for k, (name, (m, A, C)) in enumerate((("inner", INNER), ("outer", OUTER)))
+    ]
+    ends = {"a": "inner.a", "b": "inner.b", "between": "outer.between", "d": "outer.d"}
+    forces = [
+        fd.Bushing(
+            name,
+            "inner.between" if name == "between" else f"ground.{name}",
+            end,
+            np.diag(
+                [BETWEEN if name == "between" else STIFFNESS] * 2
+                + [1e6 if name in ("a", "between") else 0.0]
+                + [0.0] * 3
+            ),
+            np.diag([DAMPING] * 2 + [0.0] * 4),
+        )
+        for name, end in ends.items()
+    ]
+    bodies = [
+        fd.Body(part.name, part, position=(0, 0, z), omega_bar=(0, 0, speed))
+        for part, z, speed in zip(parts, (0.0, 0.2), SPEEDS, strict=True)
+    ]
+    return fd.Scene(
+        tuple(bodies), forces=tuple(forces), ground={"a": (0, 0, -0.3), "b": (0, 0, 0.2), "d": (0, 0, 0.45)}
+    )
+
+
+def coaxial_at_rest() -> np.ndarray:
+    """Eigenvalues (16,) in axes that do not turn; the damper between the rotors turns with the inner one."""
+    M = np.diag([m for mass, across, _ in (INNER, OUTER) for m in (mass, mass, across, across)])
+    C, K, around = np.zeros((8, 8)), np.zeros((8, 8)), np.array([[0.0, -1.0], [1.0, 0.0]])
+    for first, along, speed in ((2, INNER[2], SPEEDS[0]), (6, OUTER[2], SPEEDS[1])):
+        C[first : first + 2, first : first + 2] = -along * speed * around
+    for name, (inner, outer) in AT.items():
+        on = [np.zeros((2, 4)) if z is None else np.array([[1, 0, 0, z], [0, 1, -z, 0]]) for z in (inner, outer)]
+        B = np.hstack([-on[0] if name == "between" else on[0], on[1]])
+        k, turning = (BETWEEN, SPEEDS[0]) if name == "between" else (STIFFNESS, 0.0)
+        C += DAMPING * B.T @ B
+        K += B.T @ (k * np.eye(2) - DAMPING * turning * around) @ B
+    return np.linalg.eigvals(
+        np.block([[np.zeros((8, 8)), np.eye(8)], [-np.linalg.solve(M, K), -np.linalg.solve(M, C)]])
+    )
+
+
+@pytest.mark.slow
+def test_rotors_that_turn_against_each_other_have_the_multipliers_of_axes_at_rest():
+    period = 2 * np.pi / 100.0
+    found = fd.periodic(coaxial(), period=period, floquet=True, check=False)
+    values = np.array([complex(*one) for one in found.attributes["multipliers"]])
+    for exact in np.exp(coaxial_at_rest() * period):
+        assert np.abs(values - exact).min() < 1e-6
+
+
+def test_modes_of_rotors_at_several_speeds_are_told_to_be_those_of_the_mean():
+    ((_, found),) = steady_states(coaxial(), ())
+    assert "`periodic` with floquet finds the motion itself and its modes" in found.notes[-1]

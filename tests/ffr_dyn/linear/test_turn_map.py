@@ -401,3 +401,28 @@ def test_a_rotor_whose_speed_nothing_keeps_is_told_to_be_driven():
     turn = fd.periodic(braked(True), method=fd.ROS3(2 * np.pi / 90 / 400), check=False)
     whirl = np.linalg.norm(turn["disc.l.position"][:, 1:], axis=1)
     np.testing.assert_allclose(whirl, 1e-3 * 90**2 / abs(1e4 - 90**2 + 40j * 90), rtol=1e-4)
+
+
+def test_a_round_rotor_whose_loads_are_rounding_is_accurate():
+    """Nothing pushes it but what is left of its own mass and speed; the error of that was told as all of its range."""
+    ends, spin = {"left": (-0.2, 0, 0), "right": (0.3, 0, 0)}, {"omega_bar": (100.0, 0, 0)}
+    disc = fd.rigid_body("disc", mass=10.0, inertia=(0.9, 0.5, 0.5), points=ends)
+    motor = fd.rigid_body("motor", mass=1.0, inertia=(1e-3,) * 3, points={"c": (0, 0, 0)})
+    forces = [
+        fd.Bushing(end, f"ground.{end}", f"disc.{end}", np.diag([1e6] * 3 + [0] * 3), np.diag([500.0] * 3 + [0] * 3))
+        for end in ends
+    ]
+    forces.append(
+        fd.Bushing("coupling", "motor.c", "disc.left", np.diag([0, 0, 0, 2e4, 0, 0]), np.diag([0, 0, 0, 1, 0, 0]))
+    )
+    scene = fd.Scene(
+        (fd.Body("disc", disc, **spin), fd.Body("motor", motor, position=ends["left"], **spin)),
+        (fd.Joint("shaft", "revolute", "ground.left", "motor.c", axis=(1, 0, 0)),),
+        (fd.Driver("drive", "shaft", fd.polynomial(0.0, 100.0)),),
+        forces=tuple(forces),
+        ground=ends,
+    )
+    found = fd.periodic(scene, method=fd.ROS3(2 * np.pi / 100.0 / 2000))
+    error, of_range = np.array(list(found.attributes["errors"].values())).T
+    assert error.max() < 1e-6
+    assert of_range.max() < 0.01
