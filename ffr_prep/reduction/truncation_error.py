@@ -60,7 +60,7 @@ def _probes(model: CoupledModel, held: SupportedBody, Z: Array) -> Iterator[Arra
     y, supports = np.random.default_rng(0).standard_normal((len(Z), 1)), held.C.shape[0]
     for _ in range(min(_PROBES, len(Z) - supports - Z.shape[1])):
         y = solve_supported(held, product(model.M, _rest(model, Z, y)), np.zeros((supports, 1)))[0]
-        y = _rest(model, Z, _rest(model, Z, y))  # once more, as what is small in the first place is known with few digits
+        y = _rest(model, Z, _rest(model, Z, y))  # twice, as above
         y = y / np.sqrt((y * product(model.M, y)).sum())
         yield y
 

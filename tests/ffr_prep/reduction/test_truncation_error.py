@@ -63,8 +63,8 @@ def test_what_the_steps_have_in_common_is_no_new_shape():
 @pytest.mark.parametrize("reference", [fp.FixedTo("root"), fp.MeanAxis()])
 @pytest.mark.parametrize("reduction", [fp.CharacteristicModes(0, 4), fp.CharacteristicModes(2, 3)])
 def test_a_mode_that_no_shape_takes_part_in_is_missed(reference, reduction):
-    """The lowest motions of the ends bend a bar and do not twist it: a mode of torsion is told to be missing by the numbers of
-    those beyond, though these are nearly the model's own. Without, 0.39 and 0.10 were told of 0.97 and 0.44."""
+    """The lowest motions of the ends bend a bar and do not twist it: a mode of torsion is told to be missing by the
+    numbers of those beyond, though these are nearly the model's own. Without, 0.39 and 0.10 were told of 0.97 and 0.44."""
     body, whole = bar(reduction, reference), bar(fp.Eigenmodes(40), reference)
     mode, error = max(told(body).items())
     assert mode == 4
