@@ -20,7 +20,7 @@ from ffr_dyn.scene.drivers import Driver
 from ffr_dyn.scene.scene import Body, Scene, joints_of
 from ffr_prep.body import CONVERTED_FROM, TRUNCATION_ERROR, FlexibleBody, Interface, errors_of_modes
 from ffr_prep.common.arrays import Array
-from ffr_prep.common.in_words import settings_in_words
+from ffr_prep.common.in_words import percent_in_words, settings_in_words
 
 HELD = "held_body"  # of the provenance
 APART = 0.03  # relative difference of frequencies, beyond which it is told
@@ -62,7 +62,7 @@ def beyond_modes(scene: Scene, highest: float) -> list[str]:
         wrong = [(k, error) for k, error in known.items() if error > APART]
         for k, error in [] if CONVERTED_FROM in body.model.provenance else wrong[:1]:
             has = float(body.model.frequencies[k - 1])
-            found += [(has / (1 + error), f"mode {k} of {body.name!r}, of {has:.4g} Hz, by {100 * error:.2g} %")]
+            found += [(has / (1 + error), f"mode {k} of {body.name!r}, of {has:.4g} Hz, by {percent_in_words(error)}")]
     found = sorted((one for one in found if one[0] <= highest), key=lambda one: one[0])
     if not found:
         return []

@@ -24,6 +24,7 @@ from ffr_dyn.scene.parts import owner
 from ffr_dyn.scene.scene import Scene, marker_number, markers
 from ffr_prep.body import FlexibleBody, interface_motions, mass_of_motions, remembered
 from ffr_prep.common.arrays import Array
+from ffr_prep.common.in_words import percent_in_words
 
 TOLD, OF_STRESS = (
     0.05,
@@ -136,8 +137,8 @@ def left_out(scene: Scene, found: Array) -> Iterator[str]:
     for body, (whole, missing, time) in zip(scene.bodies, found.T, strict=True):
         if missing > (OF_STRESS if _stressed(body.model) else TOLD) * whole:
             yield (
-                f"body {owner(body)!r}: its shapes leave out {100 * missing / whole:.2g} % of the strain energy that the "
-                f"loads at its interfaces cause, as at t = {time:.4g} s: it deflects by less, and its stress is off; "
+                f"body {owner(body)!r}: its shapes leave out {percent_in_words(missing / whole)} of the strain energy that "
+                f"the loads at its interfaces cause, as at t = {time:.4g} s: it deflects by less, and its stress is off; "
                 "reduce it with craig-bampton or rubin, or add attachment modes"
             )
 

@@ -82,6 +82,11 @@ def test_a_clamped_bar_that_is_pulled(modes):
         assert told(fd.static(replace(scene, **more))) == told(result)
 
 
+def test_bending_modes_leave_out_all_of_a_pull():
+    """It was told as 1e+02 %."""
+    assert told(fd.static(clamped(fp.truncated(bar(fp.Eigenmodes(12)), 4)))) == [100.0]
+
+
 def test_what_is_told_of_a_run_is_of_the_forces_that_it_has():
     """A pendulum that swings bends, which twelve modes have, and is hardly pulled."""
     body = bar(fp.Eigenmodes(12))
