@@ -20,7 +20,7 @@ from ffr_dyn.scene.drivers import Driver
 from ffr_dyn.scene.scene import Body, Scene, joints_of
 from ffr_prep.body import CONVERTED_FROM, MESH_ERROR, TRUNCATION_ERROR, FlexibleBody, Interface, errors_of_modes
 from ffr_prep.common.arrays import Array
-from ffr_prep.common.in_words import settings_in_words
+from ffr_prep.common.in_words import percent_in_words, settings_in_words
 
 HELD = "held_body"  # of the provenance
 APART = 0.03  # relative difference of frequencies, beyond which it is told
@@ -78,7 +78,7 @@ def _too_fast(body: Body) -> list[tuple[float, str, str]]:
         error, has = (1 + mesh) * (1 + shapes) - 1, float(body.model.frequencies[k - 1])
         if error > APART:
             cause = MESH_ERROR if mesh > shapes else TRUNCATION_ERROR
-            words = f"mode {k} of {body.name!r}, of {has:.4g} Hz, by {100 * error:.2g} % {CAUSES[cause]}"
+            words = f"mode {k} of {body.name!r}, of {has:.4g} Hz, by {percent_in_words(error)} {CAUSES[cause]}"
             return [(has / (1 + error), cause, words)]
     return []
 

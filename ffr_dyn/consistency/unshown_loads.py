@@ -24,6 +24,7 @@ from ffr_dyn.scene.parts import owner
 from ffr_dyn.scene.scene import Scene, marker_number, markers
 from ffr_prep.body import FlexibleBody, interface_motions, mass_of_motions, remembered
 from ffr_prep.common.arrays import Array
+from ffr_prep.common.in_words import percent_in_words
 
 TOLD, OF_STRESS = (
     0.05,
@@ -42,7 +43,7 @@ class Compliance:
 
 def energies(view: View) -> Array:
     """(3, B) strain energy [J] that the loads at the interfaces of each body cause, or that it has if that is more, what its
-    shapes leave out of it, and the time [s]: of the row in which reactions deform it most. Zeros where it is not known: of
+    shapes leave out of it, and the time [s]: of the row in which they deform it most. Zeros where it is not known: of
     bodies without compliance, with loads at other points than its interfaces, or that are tied by couplings."""
     scene = view.system.scene
     found = np.zeros((3, len(scene.bodies)))
@@ -51,12 +52,28 @@ def energies(view: View) -> Array:
         if known is None or _elsewhere(view, b, known):
             continue
         loads = _reactions(view, b, known)
-        row = int(np.argmax(np.einsum("ti,ij,tj->t", loads, known.whole, loads)))
-        load = loads[row] + _applied(view, b, known, row)
-        whole, shown = (0.5 * float(load @ G @ load) for G in (known.whole, known.shown))
-        has = 0.5 * float(view.q(b)[row] ** 2 @ body.model.omega2)
-        found[:, b] = max(whole, has), whole - shown, view.record.time[row]
+        for row in _rows(view, b, known, loads):
+            load = loads[row] + _applied(view, b, known, row)
+            whole, shown = (0.5 * float(load @ G @ load) for G in (known.whole, known.shown))
+            most = max(whole, 0.5 * float(view.q(b)[row] ** 2 @ body.model.omega2))
+            if most > found[0, b]:
+                found[:, b] = most, whole - shown, view.record.time[row]
     return found
+
+
+def _rows(view: View, b: int, known: Compliance, reactions: Array) -> set[int]:
+    """Rows that are looked at, where reactions, or a force that acts on body b, or what its shapes have of both is largest:
+    a body that nothing holds has no reactions."""
+    scene, at = view.system.scene, markers(view.system.scene)
+    sizes = [
+        np.einsum("ti,ij,tj->t", reactions, known.whole, reactions),
+        view.q(b) ** 2 @ scene.bodies[b].model.omega2,
+    ]
+    for number, one in enumerate(forces_of(scene)):
+        if any(at[end][0] == b for end in _ends(scene, one.place)):
+            values = measured_values(view, number, _columns(one.place))
+            sizes.append(np.linalg.norm(values.reshape(view.rows, -1), axis=1))
+    return {int(np.argmax(size)) for size in sizes}
 
 
 def _elsewhere(view: View, b: int, known: Compliance) -> bool:
@@ -120,8 +137,8 @@ def left_out(scene: Scene, found: Array) -> Iterator[str]:
     for body, (whole, missing, time) in zip(scene.bodies, found.T, strict=True):
         if missing > (OF_STRESS if _stressed(body.model) else TOLD) * whole:
             yield (
-                f"body {owner(body)!r}: its shapes leave out {100 * missing / whole:.2g} % of the strain energy that the "
-                f"loads at its interfaces cause, as at t = {time:.4g} s: it deflects by less, and its stress is off; "
+                f"body {owner(body)!r}: its shapes leave out {percent_in_words(missing / whole)} of the strain energy that "
+                f"the loads at its interfaces cause, as at t = {time:.4g} s: it deflects by less, and its stress is off; "
                 "reduce it with craig-bampton or rubin, or add attachment modes"
             )
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ffr_prep.common.arrays import Array
+from ffr_prep.common.in_words import percent_in_words
 
 MESH_ERROR, TRUNCATION_ERROR = "mesh_error", "truncation_error"  # of the provenance
 CONVERTED_FROM = (
@@ -75,8 +76,8 @@ def modes_doubt(provenance: Mapping[str, Any]) -> str | None:
     if first < TOLD:
         return None
     return (
-        f"its shapes are too few: the lowest frequency under its reference conditions is about {100 * first:.2g} % too high; "
-        "keep more modes (`--modes`)"
+        f"its shapes are too few: the lowest frequency under its reference conditions is about {percent_in_words(first)} too "
+        "high; keep more modes (`--modes`)"
     )
 
 

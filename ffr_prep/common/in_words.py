@@ -23,6 +23,14 @@ def extent_in_words(points: Array) -> str:
     return f"{vector_in_words(np.ptp(points, axis=0))} m" if len(points) else ""
 
 
+def percent_in_words(share: float) -> str:
+    """A share of one to two digits, and to all before the point: 120 %, 0.036 %."""
+    percent = 100 * abs(share)
+    if percent < 1e-4:
+        return "less than 0.0001 %"
+    return f"{percent:.0f} %" if percent >= 10 else f"{percent:.2g} %"
+
+
 def settings_in_words(value: Any) -> str:
     """Nested settings in one line; what has a name by it, and the rest in brackets."""
     if isinstance(value, Mapping) and "type" in value and "name" in value:

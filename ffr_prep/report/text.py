@@ -21,7 +21,7 @@ from ffr_prep.body import (
 )
 from ffr_prep.body.interface_freedom import interface_freedom
 from ffr_prep.common.arrays import Array
-from ffr_prep.common.in_words import settings_in_words, vector_in_words
+from ffr_prep.common.in_words import percent_in_words, settings_in_words, vector_in_words
 from ffr_prep.reduction.quality import Quality, quality_of
 from ffr_prep.report.integrals import integral_lines
 
@@ -148,8 +148,8 @@ def part_lines(body: FlexibleBody) -> Iterator[str]:
         yield f"{'' if k else 'parts':12}{part.name}  {part.mass:.5g} kg, {part.n} elastic coordinates, {names}"
     errors = cut_errors_of(body.provenance)
     if body.parts and errors:
-        felt = [f"{_percent(error)} ({mode})" for mode, error in enumerate(errors, 1) if error >= _UNFELT]
-        each = f"{', '.join(felt)}; in brackets the mode" if felt else f"less than {_percent(_UNFELT)}"
+        felt = [f"{percent_in_words(error)} ({mode})" for mode, error in enumerate(errors, 1) if error >= _UNFELT]
+        each = f"{', '.join(felt)}; in brackets the mode" if felt else f"less than {percent_in_words(_UNFELT)}"
         yield f"cut error   frequencies of the free body too high by {each}"
 
 
@@ -174,7 +174,7 @@ def frequency_error_lines(provenance: Mapping[str, Any]) -> Iterator[str]:
     for kind, label, limits in ((MESH_ERROR, "mesh error", alone), (TRUNCATION_ERROR, "modes error", "")):
         errors = errors_of_modes(provenance, kind)
         if any(error > _NONE for error in errors.values()):
-            each = ", ".join(f"{_percent(error)} ({mode})" for mode, error in errors.items())
+            each = ", ".join(f"{percent_in_words(error)} ({mode})" for mode, error in errors.items())
             yield f"{label:12}frequencies too high by about {each}; in brackets the mode{before}{limits}"
 
 
@@ -250,7 +250,8 @@ def quality_lines(body: FlexibleBody) -> Iterator[str]:
     yield f"quality     against the full model, {low:.4g} to {high:.4g} Hz"
     yield f"{'':12}frequencies under the reference conditions: {_frequencies_in_words(quality)}"
     if quality.points:
-        yield f"{'':12}static flexibility of the free body at the interfaces: {_percent(quality.flexibility_error)} off"
+        off = percent_in_words(quality.flexibility_error)
+        yield f"{'':12}static flexibility of the free body at the interfaces: {off} off"
         yield f"{'':12}receptances there: {_receptances_in_words(quality)}"
     yield from _steady_lines(quality)
 
@@ -264,7 +265,7 @@ def _frequencies_in_words(quality: Quality) -> str:
         return f"none within the band{lost}"
     worst = int(np.argmax(errors))
     return (
-        f"{errors.size} within the band, off by up to {_percent(errors[worst])} "
+        f"{errors.size} within the band, off by up to {percent_in_words(errors[worst])} "
         f"(at {quality.mode_frequencies[worst]:.4g} Hz){lost}"
     )
 
@@ -272,7 +273,7 @@ def _frequencies_in_words(quality: Quality) -> str:
 def _receptances_in_words(quality: Quality) -> str:
     wrong = quality.receptance_errors > _CLOSE
     worst = int(np.argmax(quality.receptance_errors))
-    off = f"off by up to {_percent(quality.receptance_errors[worst])} (at {quality.frequencies[worst]:.4g} Hz)"
+    off = f"off by up to {percent_in_words(quality.receptance_errors[worst])} (at {quality.frequencies[worst]:.4g} Hz)"
     if not wrong.any():
         return off
     first = int(np.argmax(wrong))
@@ -288,14 +289,7 @@ def _steady_lines(quality: Quality) -> Iterator[str]:
 
 
 def _largest(errors: Array) -> str:
-    return "no deformation" if np.isnan(errors).all() else _percent(float(np.nanmax(errors)))
-
-
-def _percent(error: float) -> str:
-    percent = 100 * abs(error)
-    if percent < 1e-4:
-        return "less than 0.0001 %"
-    return f"{percent:.0f} %" if percent >= 10 else f"{percent:.2g} %"
+    return "no deformation" if np.isnan(errors).all() else percent_in_words(float(np.nanmax(errors)))
 
 
 def _choice_lines(provenance: Mapping[str, Any]) -> Iterator[str]:

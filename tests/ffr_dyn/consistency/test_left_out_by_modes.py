@@ -13,7 +13,8 @@ from test_random_scenes import Draft, tree
 import ffr_dyn as fd
 import ffr_prep as fp
 from ffr_dyn.compile.workspace import new_record
-from ffr_dyn.consistency.unshown_loads import Compliance, _applied, _reactions
+from ffr_dyn.consistency.unshown_loads import Compliance, _applied, _reactions, energies
+from ffr_dyn.consistency.unshown_loads import left_out as left_out_of
 from ffr_dyn.results.recorded_motion import View
 from ffr_dyn.scene.joints import COORDINATES
 from ffr_prep.report.text import short_lines
@@ -81,6 +82,11 @@ def test_a_clamped_bar_that_is_pulled(modes):
         assert told(fd.static(replace(scene, **more))) == told(result)
 
 
+def test_bending_modes_leave_out_all_of_a_pull():
+    """It was told as 1e+02 %."""
+    assert told(fd.static(clamped(fp.truncated(bar(fp.Eigenmodes(12)), 4)))) == [100.0]
+
+
 def test_what_is_told_of_a_run_is_of_the_forces_that_it_has():
     """A pendulum that swings bends, which twelve modes have, and is hardly pulled."""
     body = bar(fp.Eigenmodes(12))
@@ -88,6 +94,31 @@ def test_what_is_told_of_a_run_is_of_the_forces_that_it_has():
     pulled = fd.forward(clamped(body), end=0.02, output_step=1e-3, method=fd.ROS2(1e-5), begin="quasi-static")
     assert told(bent) == []
     assert told(pulled) == [pytest.approx(100 * left_out(1), rel=0.2)]
+
+
+@pytest.mark.parametrize("held", [True, False])
+def test_a_body_that_no_joint_holds_is_looked_at_where_its_forces_are_largest(held):
+    """A bar that flies freely, or is held by a bushing, in three rows: a push across or a pull that comes and goes, beside a
+    little of the other all the time. A bar that its own inertia holds stretches by sum 2 / (k pi)^2 = 1/3 of F l / (E A)."""
+    bush = fd.Bushing("bush", "ground.O", "bar.root", (1e8,) * 3 + (1e5,) * 3)
+    body = bar(fp.Eigenmodes(12), fp.MeanAxis())
+    share = 1 - 3 * sum(2 / (k * np.pi) ** 2 for k in range(1, axial(body) + 1))
+
+    def told_of(all_the_time, for_a_while) -> list[str]:
+        push = fd.Load(
+            "push",
+            "bar.end",
+            function=lambda t, state: np.add(all_the_time, np.multiply(for_a_while, t == 1.0)),
+        )
+        scene = fd.Scene([fd.Body("bar", body)], loads=[push], forces=[bush] * held, ground={"O": (0, 0, 0)})
+        found = fd.assemble(scene)
+        view = View(found.system, recorded(found, times=(0.0, 1.0, 2.0)))
+        return list(left_out_of(found.system.scene, energies(view)))
+
+    assert told_of((1e-3, 0, 0), (0, 10.0, 0)) == []
+    (note,) = told_of((0, 1e-3, 0), (1e4, 0, 0))
+    assert f"leave out {100 * share:.2g} % of the strain energy" in note
+    assert "as at t = 1 s" in note
 
 
 @pytest.mark.parametrize(
@@ -153,12 +184,13 @@ def assert_balanced(scene: fd.Scene) -> None:
         np.testing.assert_allclose(moments, -np.cross(body.model.r_dm + body.model.P_dm @ q, weight), atol=1e-6 * size)
 
 
-def recorded(found: fd.Assembled):
-    """The one row of an assembled scene."""
+def recorded(found: fd.Assembled, times=(0.0,)):
+    """Rows of an assembled scene that does not move."""
     from ffr_dyn.compile.engine import new_engine, record_row
 
-    engine, rows = new_engine(found.system, found.x, found.v), new_record(found.system, 1)
-    record_row(engine, 0.0, rows, 0)
+    engine, rows = new_engine(found.system, found.x, found.v), new_record(found.system, len(times))
+    for k, time in enumerate(times):
+        record_row(engine, time, rows, k)
     return rows
 
 
