@@ -105,6 +105,10 @@ class Request:
         ):
             if isinstance(given, type) or not hasattr(given, "rows" if what == "reference" else "basis"):
                 raise InputError(f"{what} is {given!r}; give one such as {such}")
+        require_kind(self.name, str, "name", "a text such as 'rod'")
+        require_kind(self.damping, Damping, "damping", "one such as Damping(beta=1e-6)")
+        require_kind(self.quality, (Band, type(None)), "quality", "a band such as Band(5, 500)")
+        require_kind(self.solver, Solver, "solver", "one such as Solver('cholesky')")
 
 
 @on_one_thread

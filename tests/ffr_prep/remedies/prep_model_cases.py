@@ -144,6 +144,7 @@ CONDITIONS = [
         p(reduced, "left", InterfaceRegion("right", point=(1e4, 0.0, 0.0))),
         p(reduced, "left", InterfaceRegion("right", point=(1.0, 0.0, 0.0))),
     ),
+    Case(p(reduced, LEFT, damping=None), p(reduced, LEFT, damping=fp.Damping(beta=1e-6))),
 ]
 
 # ---- reductions ------------------------------------------------------------------------------------------------------
