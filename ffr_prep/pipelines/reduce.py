@@ -242,7 +242,7 @@ def _reduced(model: Model, request: Request, progress: Stages, advance: Advance)
         damping=model.damping(basis.Z),
         **vars(integrals),
     )
-    return _with_held_body(_with_doubts(made), model, body, progress)
+    return _with_held_body(_with_doubts(made), model, body, held, progress)
 
 
 def _with_doubts(made: FlexibleBody) -> FlexibleBody:
@@ -265,16 +265,18 @@ def _doubts(
     return [*model.doubts(basis.Z), *filter(None, found)]
 
 
-def _with_held_body(made: FlexibleBody, model: Model, body: FreeBody, progress: Stages) -> FlexibleBody:
+def _with_held_body(
+    made: FlexibleBody, model: Model, body: FreeBody, held: SupportedBody | None, progress: Stages
+) -> FlexibleBody:
     """The body with how it would vibrate with its interfaces held, where its own shapes cannot tell."""
-    if model.massless or not needs_held_body(made, model.coupled, body):
+    if held is None or model.massless or not needs_held_body(made, model.coupled, held):
         return made
     progress("look at the interfaces held")
-    held = held_body(model.coupled, body, model.inertia)
+    kept = held_body(model.coupled, body, model.inertia)
     stressed = made.surface is not None and (made.surface.stress is not None or made.surface.beams is not None)
-    unshown = unshown_loads(made, held) if stressed else None
+    unshown = unshown_loads(made, kept) if stressed else None
     warnings = [*made.provenance["warnings"], *filter(None, [unshown])]
-    return replace(made, provenance={**made.provenance, "held_body": held, "warnings": warnings})
+    return replace(made, provenance={**made.provenance, "held_body": kept, "warnings": warnings})
 
 
 # ---- basis --------------------------------------------------------------------------------------------------------

@@ -24,25 +24,23 @@ from ffr_prep.model.reference import MeanAxis, functionals
 from ffr_prep.reduction.methods.craig_bampton import CraigBampton
 from ffr_prep.reduction.methods.guyan import Guyan
 from ffr_prep.reduction.responses import mean_motion, static_solver
-from ffr_prep.solvers.factor import FreeBody
+from ffr_prep.solvers.factor import FreeBody, SupportedBody, solve_refined
 
 _MODES = 3  # with the interfaces held
 _SHOWN = 0.5  # of the strain energy under a load, below which it is told
-_SLIGHT = (
-    1e-2  # of the strain energy under loads that balance one another, which a basis with the static shapes has all of
-)
+_SLIGHT = 1e-2  # of the strain energy under balanced loads, which a basis with the static shapes has all of
 _LOADS = [f"{what} {axis}" for what in ("a force along", "a moment about") for axis in "xyz"]
 _MOST = 6  # that are told
 
 
-def needs_held_body(made: FlexibleBody, model: CoupledModel, body: FreeBody) -> bool:
+def needs_held_body(made: FlexibleBody, model: CoupledModel, held: SupportedBody) -> bool:
     """Whether some motions of the interfaces against each other are beyond the reduced body `made`, or it has not the static
     shapes of loads there."""
     possible, wanted = interface_freedom(made) if made.interfaces and made.n else (0, 0)
-    return possible < wanted or (wanted > 6 and _left_out(made, model, body) > _SLIGHT)
+    return possible < wanted or (wanted > 6 and _left_out(made, model, held) > _SLIGHT)
 
 
-def _left_out(made: FlexibleBody, model: CoupledModel, body: FreeBody) -> float:
+def _left_out(made: FlexibleBody, model: CoupledModel, held: SupportedBody) -> float:
     """About the mean share of strain energy that the reduced body leaves out under loads at its interfaces that balance one
     another: under one combination of them, of each direction in which they deform it as much by its own energy."""
     rigid, elastic = np.split(interface_motions(made), [6], axis=1)
@@ -52,7 +50,7 @@ def _left_out(made: FlexibleBody, model: CoupledModel, body: FreeBody) -> float:
     left, sizes, _ = np.linalg.svd(flexible, full_matrices=False)
     signs = np.where(np.arange(sizes.size) % 2, 1.0, -1.0)
     load = loads @ (left / sizes @ signs)
-    response = static_solver(model, body, mean_motion(model))((model.C.T @ load)[:, None])[:, 0]
+    response = solve_refined(held, (model.C.T @ load)[:, None], np.zeros((held.C.shape[0], 1)))[0][:, 0]
     return float(load @ (model.C @ response)) / sizes.size - 1.0
 
 
